@@ -1,0 +1,25 @@
+//! A smooth velocity: `mean |(-alpha Laplacian + gamma I) V|` (the paper, `L_v`; the operator is that of
+//! diffeomorphic registration, Beg et al. 2005).
+//!
+//! It needs an activation with a second derivative: with a ReLU the Laplacian is zero almost everywhere.
+
+use burn::tensor::Tensor;
+use burn::tensor::backend::Backend;
+
+use crate::operators::{VelocityJet, length};
+
+/// The mean length of `gamma V - alpha Laplacian V`.
+///
+/// # Panics
+/// If the jet was asked for without its Laplacian and `alpha` is not 0.
+pub fn smoothness<B: Backend>(v: &VelocityJet<B>, alpha: f64, gamma: f64) -> Tensor<B, 1> {
+    let still = v.value.clone() * gamma;
+    if alpha == 0.0 {
+        return length(still).mean();
+    }
+    let laplacian = v
+        .laplacian
+        .clone()
+        .expect("the smoothness term asks for the Laplacian");
+    length(still - laplacian * alpha).mean()
+}

@@ -1,0 +1,36 @@
+//! What the tests of this crate share: the backends they run on, and the way in and out of tensors.
+
+use burn::tensor::{Tensor, TensorData, backend::Backend};
+use burn_autodiff::Autodiff;
+use burn_ndarray::NdArray;
+
+/// Values only.
+pub type Plain = NdArray;
+/// What training runs on.
+pub type Train = Autodiff<NdArray>;
+
+/// Points as a tensor `[n, 3]`.
+pub fn points<B: Backend>(points: &[[f64; 3]]) -> Tensor<B, 2> {
+    let flat: Vec<f64> = points.iter().flatten().copied().collect();
+    Tensor::from_data(
+        TensorData::new(flat, [points.len(), 3]),
+        &Default::default(),
+    )
+}
+
+/// Values as a tensor `[n, 1]`.
+pub fn column<B: Backend>(values: &[f64]) -> Tensor<B, 2> {
+    Tensor::from_data(
+        TensorData::new(values.to_vec(), [values.len(), 1]),
+        &Default::default(),
+    )
+}
+
+/// The elements of a tensor, row by row.
+pub fn host<B: Backend, const D: usize>(tensor: Tensor<B, D>) -> Vec<f64> {
+    tensor
+        .into_data()
+        .convert::<f64>()
+        .to_vec()
+        .expect("a float tensor converts to f64")
+}

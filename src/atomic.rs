@@ -1,0 +1,67 @@
+//! Whole files or none: every file that isomorph leaves under a final name is first written
+//! beside it under a temporary one, flushed to the disk, and then renamed.
+
+use std::io::{self, BufWriter, Write};
+use std::path::Path;
+
+/// Writes a file so that `path` holds either what it held before or all of what `write` writes.
+///
+/// Missing parent directories are created. On any error the temporary file is removed.
+///
+/// # Errors
+/// What `write` returns, or what the file system says; the message names `path`.
+pub fn write_atomically(
+    path: &Path,
+    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> io::Result<()> {
+    let folder = match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    let whole = || -> io::Result<()> {
+        std::fs::create_dir_all(folder)?;
+        let temporary = tempfile::Builder::new().prefix(".isomorph-").tempfile_in(folder)?;
+        let mut buffered = BufWriter::with_capacity(1 << 16, temporary.as_file());
+        write(&mut buffered)?;
+        buffered.flush()?;
+        drop(buffered);
+        temporary.as_file().sync_all()?;
+        make_readable(temporary.as_file())?;
+        temporary.persist(path).map_err(|refused| refused.error)?;
+        Ok(())
+    };
+    whole().map_err(|error| io::Error::new(error.kind(), format!("{}: {error}", path.display())))
+}
+
+/// Temporary files are private to their owner; a result is an ordinary file.
+#[cfg(unix)]
+fn make_readable(file: &std::fs::File) -> io::Result<()> {
+    use std::os::unix::fs::PermissionsExt;
+    file.set_permissions(std::fs::Permissions::from_mode(0o644))
+}
+
+#[cfg(not(unix))]
+fn make_readable(_file: &std::fs::File) -> io::Result<()> {
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failed_write_leaves_the_old_file_and_no_other() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("deep/result.txt");
+        write_atomically(&path, |out| out.write_all(b"first")).expect("a first write");
+        let refused = write_atomically(&path, |out| {
+            out.write_all(b"half of the sec")?;
+            Err(io::Error::other("the disk is full"))
+        });
+        let message = refused.expect_err("the write failed").to_string();
+        assert!(message.contains("result.txt") && message.contains("disk is full"), "{message}");
+        assert_eq!(std::fs::read(&path).expect("still there"), b"first");
+        let left = std::fs::read_dir(path.parent().expect("a parent")).expect("a folder").count();
+        assert_eq!(left, 1, "the temporary file is gone");
+    }
+}

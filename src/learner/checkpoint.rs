@@ -1,0 +1,296 @@
+//! Checkpoints: networks and optimiser states in full precision, whole or not at all.
+//!
+//! ```text
+//! checkpoints/step-000500/
+//!   implicit.mpk  implicit-optimiser.mpk  velocity.mpk  velocity-optimiser.mpk
+//!   state.json    the step, what made it, and the size and checksum of every other file
+//! ```
+//!
+//! The folder is written under a temporary name, flushed, and renamed. `state.json` is read first; a file
+//! whose size or checksum is not the one it names is reported, never loaded.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use burn::record::{FullPrecisionSettings, NamedMpkBytesRecorder, Record, Recorder};
+use burn::tensor::backend::Backend;
+use serde::{Deserialize, Serialize};
+
+use crate::recipe::{Recipe, RecipeError};
+use crate::shape::{Bounds, Normalisation};
+
+/// The layout of a checkpoint; raised when an older isomorph could not read it.
+pub const FORMAT_VERSION: u32 = 1;
+
+/// The burn release whose records a checkpoint holds.
+pub const BURN_VERSION: &str = "0.21.0";
+
+const STATE: &str = "state.json";
+
+/// What `state.json` holds.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct State {
+    /// [`FORMAT_VERSION`] of the writer.
+    pub format_version: u32,
+    /// The release of isomorph that wrote it.
+    pub isomorph_version: String,
+    /// The release of burn that wrote it.
+    pub burn_version: String,
+    /// Steps done.
+    pub step: usize,
+    /// Seconds of training that they took, over all resumes.
+    pub seconds: f64,
+    /// The seed of the run.
+    pub seed: u64,
+    /// The backend that made the last step.
+    pub backend: String,
+    /// A checksum of the network sections of the recipe.
+    pub network_digest: String,
+    /// From the user's coordinates to the network's.
+    pub normalisation: Normalisation,
+    /// The bounds of both shapes, normalised.
+    pub bounds: Bounds,
+    /// The whole recipe, resolved, as TOML.
+    pub recipe: String,
+    /// Size and checksum of the other files, by name.
+    pub files: BTreeMap<String, FileDigest>,
+}
+
+/// What a file must look like.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FileDigest {
+    /// Its length in bytes.
+    pub bytes: u64,
+    /// CRC-32 of its content.
+    pub crc32: u32,
+}
+
+impl FileDigest {
+    fn of(content: &[u8]) -> Self {
+        Self { bytes: content.len() as u64, crc32: crc32fast::hash(content) }
+    }
+}
+
+/// Why a checkpoint cannot be written or read.
+#[derive(Debug, thiserror::Error)]
+pub enum CheckpointError {
+    /// The file system refused.
+    #[error("{path}: {source}")]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// What it said.
+        source: io::Error,
+    },
+    /// There is none to start from.
+    #[error("{0}: no checkpoint here; start the run with `isomorph train`")]
+    None(PathBuf),
+    /// A file is not what was written.
+    #[error(
+        "{path}: {problem}: the checkpoint is damaged; delete its folder to use the one before it"
+    )]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// Written by a later isomorph.
+    #[error("{path}: format version {found}, this isomorph reads {FORMAT_VERSION}: update isomorph")]
+    Version {
+        /// The file.
+        path: PathBuf,
+        /// Its version.
+        found: u32,
+    },
+    /// The recipe inside does not parse.
+    #[error(transparent)]
+    Recipe(#[from] RecipeError),
+}
+
+/// A checkpoint on the disk whose `state.json` has been read.
+#[derive(Clone, Debug)]
+pub struct Checkpoint {
+    /// Its folder.
+    pub path: PathBuf,
+    /// What it says of itself.
+    pub state: State,
+}
+
+impl Checkpoint {
+    /// Opens a checkpoint's folder.
+    ///
+    /// # Errors
+    /// [`CheckpointError`] if `state.json` is missing, damaged or too new.
+    pub fn open(path: &Path) -> Result<Self, CheckpointError> {
+        let file = path.join(STATE);
+        let text = fs::read_to_string(&file)
+            .map_err(|source| CheckpointError::Io { path: file.clone(), source })?;
+        let damaged = |error: serde_json::Error| CheckpointError::Damaged {
+            path: file.clone(),
+            problem: format!("not the JSON that was written ({error})"),
+        };
+        let value: serde_json::Value = serde_json::from_str(&text).map_err(damaged)?;
+        let found = value["format_version"].as_u64().unwrap_or(0) as u32;
+        if found > FORMAT_VERSION {
+            return Err(CheckpointError::Version { path: file, found });
+        }
+        let state = serde_json::from_value(value).map_err(damaged)?;
+        Ok(Self { path: path.to_path_buf(), state })
+    }
+
+    /// The newest checkpoint in a folder of checkpoints.
+    ///
+    /// # Errors
+    /// [`CheckpointError::None`] if there is none; that of [`Self::open`] if it is damaged.
+    pub fn newest(folder: &Path) -> Result<Self, CheckpointError> {
+        match list(folder).last() {
+            Some((_, path)) => Self::open(path),
+            None => Err(CheckpointError::None(folder.to_path_buf())),
+        }
+    }
+
+    /// The recipe that it was made with.
+    ///
+    /// # Errors
+    /// [`CheckpointError::Recipe`] if it no longer parses.
+    pub fn recipe(&self) -> Result<Recipe, CheckpointError> {
+        Ok(Recipe::parse(&self.state.recipe, &self.path.join("recipe.toml"), &[])?)
+    }
+
+    /// Reads one record, checked against its digest.
+    ///
+    /// # Errors
+    /// [`CheckpointError::Damaged`] if it is not what was written.
+    pub fn load<B: Backend, R: Record<B>>(
+        &self,
+        part: Part,
+        device: &B::Device,
+    ) -> Result<R, CheckpointError> {
+        let path = self.path.join(part.file());
+        let content =
+            fs::read(&path).map_err(|source| CheckpointError::Io { path: path.clone(), source })?;
+        let damaged = |problem| CheckpointError::Damaged { path: path.clone(), problem };
+        let found = FileDigest::of(&content);
+        match self.state.files.get(part.file()) {
+            None => return Err(damaged(format!("not named in {STATE}"))),
+            Some(wanted) if wanted.bytes != found.bytes => {
+                return Err(damaged(format!("{} bytes, {} written", found.bytes, wanted.bytes)));
+            }
+            Some(wanted) if *wanted != found => {
+                return Err(damaged("its checksum is not the one written".to_owned()));
+            }
+            Some(_) => {}
+        }
+        let recorder = NamedMpkBytesRecorder::<FullPrecisionSettings>::default();
+        Recorder::<B>::load(&recorder, content, device).map_err(|error| damaged(error.to_string()))
+    }
+}
+
+/// The records in a checkpoint.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// The Implicit-Net.
+    Implicit,
+    /// Its optimiser.
+    ImplicitOptimiser,
+    /// The Velocity-Net.
+    Velocity,
+    /// Its optimiser.
+    VelocityOptimiser,
+}
+
+impl Part {
+    const fn file(self) -> &'static str {
+        match self {
+            Self::Implicit => "implicit.mpk",
+            Self::ImplicitOptimiser => "implicit-optimiser.mpk",
+            Self::Velocity => "velocity.mpk",
+            Self::VelocityOptimiser => "velocity-optimiser.mpk",
+        }
+    }
+}
+
+/// The bytes of a record.
+///
+/// # Errors
+/// What burn's recorder says.
+pub fn encode<B: Backend>(record: impl Record<B>) -> io::Result<Vec<u8>> {
+    let recorder = NamedMpkBytesRecorder::<FullPrecisionSettings>::default();
+    Recorder::<B>::record(&recorder, record, ()).map_err(|error| io::Error::other(error.to_string()))
+}
+
+/// Writes a checkpoint into `folder` and deletes all but the `keep` newest there; returns its path.
+///
+/// # Errors
+/// [`CheckpointError::Io`]; nothing is left under the final name then.
+pub fn save(
+    folder: &Path,
+    mut state: State,
+    parts: Vec<(Part, Vec<u8>)>,
+    keep: usize,
+) -> Result<PathBuf, CheckpointError> {
+    state.files =
+        parts.iter().map(|(part, bytes)| (part.file().into(), FileDigest::of(bytes))).collect();
+    let path = folder.join(format!("step-{:06}", state.step));
+    let written = || -> io::Result<()> {
+        fs::create_dir_all(folder)?;
+        let temporary = tempfile::Builder::new().prefix(".step-").tempdir_in(folder)?;
+        for (part, bytes) in &parts {
+            write_through(&temporary.path().join(part.file()), bytes)?;
+        }
+        write_through(&temporary.path().join(STATE), &serde_json::to_vec_pretty(&state)?)?;
+        flush_folder(temporary.path())?;
+        if path.exists() {
+            fs::remove_dir_all(&path)?;
+        }
+        fs::rename(temporary.path(), &path)?;
+        // Renamed away: there is nothing left to delete.
+        let _ = temporary.keep();
+        flush_folder(folder)
+    };
+    written().map_err(|source| CheckpointError::Io { path: path.clone(), source })?;
+    let all = list(folder);
+    for (_, old) in &all[..all.len().saturating_sub(keep)] {
+        fs::remove_dir_all(old)
+            .map_err(|source| CheckpointError::Io { path: old.clone(), source })?;
+    }
+    Ok(path)
+}
+
+/// The checkpoints in a folder, oldest first.
+pub fn list(folder: &Path) -> Vec<(usize, PathBuf)> {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut found: Vec<_> = entries
+        .filter_map(|entry| {
+            let name = entry.file_name();
+            let step = name.to_str()?.strip_prefix("step-")?.parse().ok()?;
+            Some((step, entry.path()))
+        })
+        .collect();
+    found.sort();
+    found
+}
+
+/// Deletes what an interrupted [`save`] left behind.
+pub fn sweep(folder: &Path) {
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        if entry.file_name().to_string_lossy().starts_with(".step-") {
+            // Only unused space is at stake: not worth stopping for.
+            let _ = fs::remove_dir_all(entry.path());
+        }
+    }
+}
+
+fn write_through(path: &Path, content: &[u8]) -> io::Result<()> {
+    let mut file = fs::File::create(path)?;
+    file.write_all(content)?;
+    file.sync_all()
+}
+
+/// Makes the names in a folder as durable as the files; not every system can.
+fn flush_folder(path: &Path) -> io::Result<()> {
+    if cfg!(unix) { fs::File::open(path)?.sync_all() } else { Ok(()) }
+}

@@ -1,0 +1,110 @@
+//! From the recipe's words to the model's types: what the learner is told, in one place.
+
+use isomorph_model::activation::Activation;
+use isomorph_model::operators::Derivatives;
+use isomorph_model::trajectory::{Integrator, Steps};
+use isomorph_model::{ImplicitNetConfig, VelocityNetConfig};
+
+use crate::recipe::{self, LossRecipe, Recipe, TrainingRecipe};
+use crate::shape;
+
+/// Everything that shapes a step, in the model's types.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// The Implicit-Net.
+    pub implicit: ImplicitNetConfig,
+    /// The Velocity-Net.
+    pub velocity: VelocityNetConfig,
+    /// The weights of the objective.
+    pub loss: LossRecipe,
+    /// Steps, sampling and learning rates.
+    pub training: TrainingRecipe,
+    /// How derivatives are taken.
+    pub derivatives: Derivatives,
+    /// How trajectories are divided.
+    pub steps: Steps,
+    /// How trajectories are integrated.
+    pub integrator: Integrator,
+}
+
+impl Settings {
+    /// The settings that a recipe asks for.
+    pub fn new(recipe: &Recipe) -> Self {
+        let training = recipe.training.clone();
+        Self {
+            implicit: implicit(recipe),
+            velocity: velocity(recipe),
+            loss: recipe.loss.clone(),
+            derivatives: match training.derivatives {
+                recipe::Derivatives::Nested => Derivatives::Nested,
+                recipe::Derivatives::Forward => Derivatives::Forward,
+            },
+            steps: match training.times {
+                recipe::TimeSampling::Random => Steps::Even(training.time_steps),
+                recipe::TimeSampling::Grid => Steps::Grid(training.time_steps),
+            },
+            integrator: match training.integrator {
+                recipe::Integrator::Euler => Integrator::Euler,
+                recipe::Integrator::Midpoint => Integrator::Midpoint,
+                recipe::Integrator::Rk4 => Integrator::Rk4,
+            },
+            training,
+        }
+    }
+}
+
+/// The Implicit-Net of a recipe.
+pub fn implicit(recipe: &Recipe) -> ImplicitNetConfig {
+    let section = &recipe.implicit;
+    ImplicitNetConfig {
+        depth: section.depth,
+        width: section.width,
+        activation: activation(section.activation, section.beta),
+        frequencies: section.frequencies,
+        skip: section.skip,
+        sphere_radius: section.sphere_radius,
+    }
+}
+
+/// The Velocity-Net of a recipe.
+pub fn velocity(recipe: &Recipe) -> VelocityNetConfig {
+    let section = &recipe.velocity;
+    VelocityNetConfig {
+        depth: section.depth,
+        width: section.width,
+        activation: activation(section.activation, section.beta),
+        frequencies: section.frequencies,
+        skip: section.skip,
+        time_dependent: section.time_dependent,
+    }
+}
+
+fn activation(kind: recipe::Activation, beta: f64) -> Activation {
+    match kind {
+        recipe::Activation::Softplus => Activation::Softplus { beta },
+        recipe::Activation::Sine => Activation::Sine { omega: beta },
+    }
+}
+
+/// What the recipe says of the shapes.
+pub fn data(recipe: &Recipe) -> shape::DataOptions {
+    let section = &recipe.data;
+    shape::DataOptions {
+        source: section.source.clone(),
+        target: section.target.clone(),
+        correspondences: match &section.correspondences {
+            recipe::Correspondences::None => shape::CorrespondenceSource::None,
+            recipe::Correspondences::SameVertices => shape::CorrespondenceSource::SameVertices,
+            recipe::Correspondences::File(path) => shape::CorrespondenceSource::File(path.clone()),
+        },
+        points: section.points,
+        correspondence_fraction: section.correspondence_fraction,
+        normals: match section.normals {
+            recipe::NormalSource::Auto => shape::NormalSource::Auto,
+            recipe::NormalSource::Given => shape::NormalSource::Given,
+            recipe::NormalSource::Estimate => shape::NormalSource::Estimate,
+            recipe::NormalSource::None => shape::NormalSource::None,
+        },
+        seed: recipe.training.seed,
+    }
+}

@@ -1,0 +1,11 @@
+//! The program: parses the command line, runs one command, and turns what went wrong into one line and
+//! an exit status.
+
+use std::process::ExitCode;
+
+use clap::Parser;
+use isomorph::cli::{self, Cli};
+
+fn main() -> ExitCode {
+    cli::run(Cli::parse())
+}

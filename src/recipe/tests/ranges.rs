@@ -1,0 +1,136 @@
+//! What every key admits, written down a second time and apart from the table of keys.
+
+use super::*;
+use crate::recipe::rule::Kind;
+
+/// Per key: what is admitted at the low end, refused below it, admitted at the high end, refused
+/// above it; "" where there is no such end.
+const ENDS: &str = r#"
+data.points                    64      63       10000000 10000001
+data.correspondence-fraction   1e-9    0        1        1.001
+implicit.depth                 1       0        32       33
+implicit.width                 4       3        4096     4097
+implicit.beta                  1e-9    0        1000     1000.1
+implicit.frequencies           0       -1       16       17
+implicit.sphere-radius         1e-9    0        10       10.1
+implicit.skip                  0       -1       31       32
+velocity.depth                 1       0        32       33
+velocity.width                 4       3        4096     4097
+velocity.beta                  1e-9    0        1000     1000.1
+velocity.frequencies           0       -1       16       17
+velocity.skip                  0       -1       31       32
+loss.level-set                 0       -1e-9    3e38     inf
+loss.lambda-l                  0       -1e-9    3e38     inf
+loss.smoothness                0       -1e-9    3e38     inf
+loss.smoothness-alpha          0       -1e-9    3e38     inf
+loss.smoothness-gamma          0       -1e-9    3e38     inf
+loss.divergence                0       -1e-9    3e38     nan
+loss.strain                    0       -1e-9    3e38     inf
+loss.matching                  0       -1e-9    3e38     inf
+loss.matching-warm-up          0       -1e-9    3e38     inf
+loss.matching-scale            0       -1e-9    3e38     inf
+loss.data                      0       -1e-9    3e38     inf
+loss.normals                   0       -1e-9    3e38     inf
+loss.eikonal                   0       -1e-9    3e38     inf
+loss.on-surface                0       -1e-9    3e38     inf
+loss.transported-normals       0       -1e-9    3e38     inf
+loss.off-surface               0       -1e-9    3e38     inf
+loss.steadiness                0       -1e-9    3e38     inf
+training.steps                 1       0        10000000 10000001
+training.batch                 64      63       1000000  1000001
+training.correspondence-batch  1       0        1000000  1000001
+training.learning-rate         1e-9    0        1        1.001
+training.velocity-learning-rate 1e-9   0        1        1.001
+training.decay                 1e-9    0        1        1.001
+training.decay-every           1e-9    0        1        1.001
+training.final-learning-rate   0       -1e-9    1        1.001
+training.warm-up               0       -1e-9    1        1.001
+training.ramp-until            0       -1e-9    1        1.001
+training.velocity-until        0       -1e-9    1        1.001
+training.time-steps            1       0        1000     1001
+training.band-share            0       -1e-9    1        1.001
+training.band-widths           [1e-9]  [0]      [10,10]  [10,10.1]
+training.box-margin            1e-9    0        1        1.001
+training.clip                  0       -1e-9    3e38     inf
+training.seed                  0       -1       9223372036854775807 9223372036854775808
+training.log-every             1       0        10000000 10000001
+checkpoint.every               1       0        10000000 10000001
+checkpoint.keep                1       0        10000000 10000001
+result.frames                  0       -1       1000     1001
+result.resolution              8       7        1024     1025
+"#;
+
+/// Values under which every single key may take either end of its range.
+const ROOM: [&str; 5] = [
+    "implicit.depth=32",
+    "velocity.depth=32",
+    "training.warm-up=0",
+    "training.ramp-until=1",
+    "training.velocity-until=1",
+];
+
+#[test]
+fn every_number_is_admitted_to_both_ends_of_its_range_and_refused_beyond() {
+    let mut tested = Vec::new();
+    for row in ENDS.trim().lines() {
+        let [key, low, below, high, above] = row.split_whitespace().collect::<Vec<_>>()[..] else {
+            panic!("a key and four values: {row}");
+        };
+        for (value, admitted) in [(low, true), (below, false), (high, true), (above, false)] {
+            let given = format!("{key}={value}");
+            let overrides: Vec<&str> = ROOM.into_iter().chain([given.as_str()]).collect();
+            match parsed(SHAPES, &overrides) {
+                Ok(_) => assert!(admitted, "{given} is out of range"),
+                Err(error) => {
+                    let message = error.to_string();
+                    assert!(!admitted, "{message}");
+                    assert!(
+                        message.starts_with(&format!("--set {given}: must be ")),
+                        "{message}"
+                    );
+                }
+            }
+        }
+        tested.push(key.to_owned());
+    }
+    let has_ends = |kind| {
+        matches!(
+            kind,
+            Kind::Whole { .. } | Kind::Number(_) | Kind::Numbers(_)
+        )
+    };
+    let numbers: Vec<String> = KEYS
+        .iter()
+        .filter(|key| has_ends(key.rule.kind))
+        .map(Key::id)
+        .collect();
+    assert_eq!(tested, numbers);
+}
+
+#[test]
+fn every_word_is_admitted_and_no_other() {
+    let words = [
+        ("data.normals", "auto given estimate none"),
+        ("data.correspondences", "none same-vertices pairs.csv"),
+        ("implicit.activation", "softplus sine"),
+        ("velocity.activation", "softplus sine"),
+        ("velocity.time-dependent", "true false"),
+        ("loss.level-set-form", "mlse olse"),
+        ("training.schedule", "cosine step"),
+        ("training.integrator", "euler midpoint rk4"),
+        ("training.times", "random grid"),
+        ("training.derivatives", "nested forward"),
+    ];
+    for (key, admitted) in words {
+        for word in admitted.split(' ') {
+            assert!(
+                parsed(SHAPES, &[&format!("{key}={word}")]).is_ok(),
+                "{key}={word}"
+            );
+        }
+        assert!(
+            parsed(SHAPES, &[&format!("{key}=Nested")]).is_err(),
+            "{key}"
+        );
+    }
+}

@@ -1,0 +1,168 @@
+//! The keys that choose between words, as enums: `words!` gives each its spelling in the recipe.
+
+use std::fmt;
+use std::path::PathBuf;
+
+use super::rule::{Value, looks_like_path};
+use super::schema::Setting;
+
+/// Declares enums whose variants are words of the recipe.
+macro_rules! words {
+    ($(
+        $(#[$about:meta])+
+        $Name:ident { $( $(#[$meaning:meta])+ $Variant:ident = $word:literal, )+ }
+    )+) => { $(
+        $(#[$about])+
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        pub enum $Name { $( $(#[$meaning])+ $Variant, )+ }
+
+        impl $Name {
+            /// Every variant.
+            pub const ALL: &'static [$Name] = &[$($Name::$Variant),+];
+
+            /// Every word, in the order of the variants.
+            pub const WORDS: &'static [&'static str] = &[$($word),+];
+
+            /// The variant as it is written in a recipe.
+            pub const fn word(self) -> &'static str {
+                match self { $( $Name::$Variant => $word, )+ }
+            }
+
+            /// The variant that `word` spells, if one does.
+            pub fn from_word(word: &str) -> Option<$Name> {
+                match word { $( $word => Some($Name::$Variant), )+ _ => None }
+            }
+        }
+
+        impl fmt::Display for $Name {
+            fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+                out.write_str(self.word())
+            }
+        }
+
+        impl Setting for $Name {
+            fn from_value(value: Value) -> Option<$Name> {
+                match value { Value::Text(word) => $Name::from_word(&word), _ => None }
+            }
+
+            fn to_value(&self) -> Value {
+                Value::Text(self.word().to_owned())
+            }
+        }
+    )+ };
+}
+
+words! {
+    /// The values that every key left out of a recipe falls back to.
+    Preset {
+        /// A first result within minutes on a CPU.
+        Quick = "quick",
+        /// The balance of quality and time that the project recommends.
+        Default = "default",
+        /// The paper's networks, weights and schedule, with the least corrections that make
+        /// them work.
+        Paper = "paper",
+    }
+
+    /// Where the normals of the shapes come from.
+    NormalSource {
+        /// Those given with a shape, else estimated ones.
+        Auto = "auto",
+        /// Those given with the shapes; both must have them.
+        Given = "given",
+        /// Estimated from the neighbours of each point and oriented, given ones or not.
+        Estimate = "estimate",
+        /// None: the terms that need them are left out.
+        None = "none",
+    }
+
+    /// The nonlinearity of a network.
+    Activation {
+        /// `ln(1 + exp(beta x)) / beta`.
+        Softplus = "softplus",
+        /// `sin(beta x)`.
+        Sine = "sine",
+    }
+
+    /// The form of the level-set equation.
+    LevelSetForm {
+        /// Modified: `f_t + V.grad f + lambda_l f R = 0`, `R = -<J n, n>`.
+        Mlse = "mlse",
+        /// Original: `f_t + V.grad f = 0`, with the Eikonal equation beside it.
+        Olse = "olse",
+    }
+
+    /// How the learning rates fall over the steps.
+    Schedule {
+        /// Along half a cosine wave down to `final-learning-rate`.
+        Cosine = "cosine",
+        /// By the factor `decay` every `decay-every` of the steps.
+        Step = "step",
+    }
+
+    /// The method that integrates trajectories.
+    Integrator {
+        /// Forward Euler, first order, one evaluation of V a step.
+        Euler = "euler",
+        /// Explicit midpoint, second order, two evaluations.
+        Midpoint = "midpoint",
+        /// Classical Runge-Kutta, fourth order, four evaluations.
+        Rk4 = "rk4",
+    }
+
+    /// The times at which the terms between the shapes are sampled.
+    TimeSampling {
+        /// Uniform in [0, 1], with a share exactly at both ends.
+        Random = "random",
+        /// The multiples of `1 / time-steps`.
+        Grid = "grid",
+    }
+
+    /// How the derivatives of the networks by their inputs are taken.
+    Derivatives {
+        /// Repeated reverse-mode differentiation.
+        Nested = "nested",
+        /// One forward sweep that carries value, tangents and Laplacian.
+        Forward = "forward",
+    }
+}
+
+/// Which points of the two shapes are known to correspond.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Correspondences {
+    /// None are known.
+    None,
+    /// Vertex i of the source is vertex i of the target.
+    SameVertices,
+    /// The pairs `source_index,target_index` of a CSV file.
+    File(PathBuf),
+}
+
+impl Correspondences {
+    pub(super) const WORDS: &'static [&'static str] = &["none", "same-vertices"];
+}
+
+impl Setting for Correspondences {
+    fn from_value(value: Value) -> Option<Correspondences> {
+        match value {
+            Value::Text(text) => Some(match text.as_str() {
+                "none" => Correspondences::None,
+                "same-vertices" => Correspondences::SameVertices,
+                _ => Correspondences::File(text.into()),
+            }),
+            _ => None,
+        }
+    }
+
+    fn to_value(&self) -> Value {
+        Value::Text(match self {
+            Correspondences::None => "none".to_owned(),
+            Correspondences::SameVertices => "same-vertices".to_owned(),
+            // A name without folder or extension would read as a misspelt word.
+            Correspondences::File(path) => match path.to_string_lossy() {
+                text if looks_like_path(&text) => text.into_owned(),
+                text => format!("./{text}"),
+            },
+        })
+    }
+}

@@ -1,0 +1,191 @@
+//! Each event as one line of text, the same on a terminal and in `run.log`.
+//!
+//! ```text
+//! step 500 of 4000, ramp, 2m05s, 14m30s left, peak 312 MiB: total 1.23 (matching 0.810, eikonal 0.204, level-set 0.110, 5 more 0.106)
+//! ```
+//!
+//! Values of terms are weighted, so that they add up to the total.
+
+use std::path::Path;
+use std::time::Duration;
+
+use indicatif::HumanCount;
+
+use crate::learner::event::{Event, StepReport, TermReport};
+
+/// Terms that are named one by one; the others are summed.
+const NAMED_TERMS: usize = 3;
+
+/// An event of the run in this folder as a line, without its end; `None` for what needs no line.
+///
+/// `left` is how long the remaining steps may take.
+pub(super) fn line(event: &Event, run: &Path, left: Option<Duration>) -> Option<String> {
+    Some(match event {
+        Event::Tick { .. } => return None,
+        Event::Started { .. } => started(event),
+        Event::Note(text) => format!("note: {}", text.replace('\n', " ")),
+        Event::PhaseEntered { phase, step } => format!("{phase} from step {} on", step + 1),
+        Event::Step(report) => step(report, left),
+        Event::Checkpoint { step, path } => {
+            format!("checkpoint after step {step}: {}", path.display())
+        }
+        Event::Extracting { frames } => format!("extracting {}", counted(*frames, "surface")),
+        Event::Extracted { .. } => extracted(event),
+        Event::Interrupted { step } => format!(
+            "interrupted after step {step}; go on with `isomorph resume {}`",
+            run.display()
+        ),
+        Event::Finished { step, seconds } => {
+            format!(
+                "finished {} in {}",
+                counted(*step, "step"),
+                duration(*seconds)
+            )
+        }
+    })
+}
+
+/// The total of a step and its largest terms: `total 1.23 (matching 0.810, 2 more 0.420)`.
+pub(super) fn objective(report: &StepReport) -> String {
+    let mut terms: Vec<&TermReport> = report.terms.iter().collect();
+    // In the total order NaN is above infinity: a term that is no number comes first.
+    terms.sort_by(|a, b| b.weighted.abs().total_cmp(&a.weighted.abs()));
+    let (named, others) = terms.split_at(terms.len().min(NAMED_TERMS));
+    let mut parts: Vec<String> = named
+        .iter()
+        .map(|term| format!("{} {}", term.name, significant(term.weighted)))
+        .collect();
+    if !others.is_empty() {
+        let rest: f64 = others.iter().map(|term| term.weighted).sum();
+        parts.push(format!("{} more {}", others.len(), significant(rest)));
+    }
+    match parts.is_empty() {
+        true => format!("total {}", significant(report.total)),
+        false => format!("total {} ({})", significant(report.total), parts.join(", ")),
+    }
+}
+
+/// Seconds as people read them: `4.2s`, `42s`, `2m05s`, `3h07m`, `2d04h`.
+pub(super) fn duration(seconds: f64) -> String {
+    if seconds < 9.95 {
+        return format!("{seconds:.1}s");
+    }
+    let whole = seconds.round() as u64;
+    let (minutes, hours) = (whole / 60, whole / 3600);
+    match whole {
+        0..60 => format!("{whole}s"),
+        60..3600 => format!("{minutes}m{:02}s", whole % 60),
+        3600..86_400 => format!("{hours}h{:02}m", minutes % 60),
+        _ => format!("{}d{:02}h", hours / 24, hours % 24),
+    }
+}
+
+fn started(event: &Event) -> String {
+    let Event::Started {
+        backend,
+        device,
+        steps,
+        first_step,
+        implicit_parameters,
+        velocity_parameters,
+        source_points,
+        target_points,
+        correspondences,
+    } = event
+    else {
+        return String::new();
+    };
+    let begun = match first_step {
+        0 => format!("{} on", counted(*steps, "step")),
+        _ => format!("going on after step {first_step} of {steps} on"),
+    };
+    format!(
+        "{begun} {backend} ({device}): f has {}, V has {}; {} on the source, {} on the target, {}",
+        counted(*implicit_parameters, "weight"),
+        HumanCount(*velocity_parameters as u64),
+        counted(*source_points, "point"),
+        HumanCount(*target_points as u64),
+        counted(*correspondences, "correspondence"),
+    )
+}
+
+fn step(report: &StepReport, left: Option<Duration>) -> String {
+    let mut text = format!(
+        "step {} of {}, {}, {}",
+        report.step,
+        report.steps,
+        report.phase,
+        duration(report.seconds)
+    );
+    if let Some(left) = left {
+        text += &format!(", {} left", duration(left.as_secs_f64()));
+    }
+    if let Some(bytes) = report.peak_memory_bytes {
+        text += &format!(", peak {} MiB", bytes.div_ceil(1 << 20));
+    }
+    format!("{text}: {}", objective(report))
+}
+
+fn extracted(event: &Event) -> String {
+    let Event::Extracted {
+        time,
+        path,
+        vertices,
+        triangles,
+        components,
+        touches_box,
+    } = event
+    else {
+        return String::new();
+    };
+    let mut text = format!(
+        "time {time:.3}: {}, {}, {}: {}",
+        counted(*vertices, "vertex"),
+        counted(*triangles, "triangle"),
+        counted(*components, "component"),
+        path.display()
+    );
+    if *triangles == 0 {
+        text += "; f has no zero in the box at this time";
+    }
+    if *touches_box {
+        text += "; the box cuts it off: train with a larger training.box-margin";
+    }
+    text
+}
+
+/// A number of things: `1 surface`, `20,000 points`, `8 vertices`.
+fn counted(count: usize, thing: &str) -> String {
+    let number = HumanCount(count as u64);
+    match (count, thing) {
+        (1, _) => format!("1 {thing}"),
+        (_, "vertex") => format!("{number} vertices"),
+        _ => format!("{number} {thing}s"),
+    }
+}
+
+/// Three significant digits: `0.00123`, `1.23`, `12.3`, `123`, `1.23e-6`.
+fn significant(value: f64) -> String {
+    // Without its sign: the empty sum is -0.
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    if !value.is_finite() {
+        return value.to_string();
+    }
+    let scientific = format!("{value:.2e}");
+    // The exponent after rounding: 9.999 is 10.0, not 10.00.
+    let exponent = scientific
+        .split_once('e')
+        .and_then(|(_, text)| text.parse::<i32>().ok());
+    match exponent {
+        Some(exponent @ -4..=5) => {
+            format!("{value:.*}", usize::try_from(2 - exponent).unwrap_or(0))
+        }
+        _ => scientific,
+    }
+}
+
+#[cfg(test)]
+#[path = "line_tests.rs"]
+mod tests;

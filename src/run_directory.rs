@@ -1,0 +1,131 @@
+//! The folder of one run: where everything lies in it, and how it is created without harm to another.
+//!
+//! ```text
+//! recipe.toml  metrics.jsonl  run.log  checkpoints/  meshes/
+//! ```
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Why a run's folder cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// Something is there already.
+    #[error("{0}: exists already; resume it with `isomorph resume {0}`, choose another with --run, or replace it with --force")]
+    Exists(PathBuf),
+    /// Something is there that is not a run, which --force does not delete.
+    #[error("{0}: exists and is not a run (it has no recipe.toml), so --force leaves it alone; choose another folder with --run")]
+    NotARun(PathBuf),
+    /// Not a run.
+    #[error("{0}: not a run: it has no recipe.toml; give the folder that `isomorph train` made")]
+    Missing(PathBuf),
+    /// The file system refused.
+    #[error("{path}: {source}")]
+    Io {
+        /// The folder.
+        path: PathBuf,
+        /// What it said.
+        source: io::Error,
+    },
+}
+
+/// The folder of one run.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RunDirectory(PathBuf);
+
+impl RunDirectory {
+    /// Makes the folder of a new run and writes the resolved recipe into it.
+    ///
+    /// # Errors
+    /// [`RunError`]; with `force` an older run there is deleted first, and nothing but a run ever is.
+    pub fn create(path: &Path, recipe: &str, force: bool) -> Result<Self, RunError> {
+        let io = |source| RunError::Io { path: path.to_path_buf(), source };
+        let occupied = match fs::read_dir(path) {
+            Ok(mut entries) => entries.next().is_some(),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => false,
+            Err(source) => return Err(io(source)),
+        };
+        let run = Self(path.to_path_buf());
+        if occupied {
+            if !force {
+                return Err(RunError::Exists(path.to_path_buf()));
+            }
+            if !run.recipe().is_file() {
+                return Err(RunError::NotARun(path.to_path_buf()));
+            }
+            run.clear().map_err(io)?;
+        }
+        fs::create_dir_all(path).map_err(io)?;
+        crate::atomic::write_atomically(&run.recipe(), |out| out.write_all(recipe.as_bytes()))
+            .map_err(io)?;
+        Ok(run)
+    }
+
+    /// Opens the folder of an existing run.
+    ///
+    /// # Errors
+    /// [`RunError::Missing`] if it holds no recipe.
+    pub fn open(path: &Path) -> Result<Self, RunError> {
+        let run = Self(path.to_path_buf());
+        if run.recipe().is_file() { Ok(run) } else { Err(RunError::Missing(path.to_path_buf())) }
+    }
+
+    /// The folder itself.
+    pub fn path(&self) -> &Path {
+        &self.0
+    }
+
+    /// The resolved recipe.
+    pub fn recipe(&self) -> PathBuf {
+        self.0.join("recipe.toml")
+    }
+
+    /// The folder of checkpoints.
+    pub fn checkpoints(&self) -> PathBuf {
+        self.0.join("checkpoints")
+    }
+
+    /// The folder of extracted surfaces.
+    pub fn meshes(&self) -> PathBuf {
+        self.0.join("meshes")
+    }
+
+    /// Deletes what a run is made of, and nothing else.
+    fn clear(&self) -> io::Result<()> {
+        for folder in [self.checkpoints(), self.meshes()] {
+            if folder.exists() {
+                fs::remove_dir_all(folder)?;
+            }
+        }
+        for file in ["metrics.jsonl", "run.log", "report.html", "recipe.toml"] {
+            match fs::remove_file(self.0.join(file)) {
+                Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_is_replaced_only_by_force_and_only_if_it_is_a_run() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("run");
+        RunDirectory::create(&path, "first", false).expect("a new run");
+        fs::write(path.join("mine.txt"), "kept").expect("a file of the user's");
+        let refused = RunDirectory::create(&path, "second", false).expect_err("it exists");
+        assert!(refused.to_string().contains("--force"), "{refused}");
+        let run = RunDirectory::create(&path, "second", true).expect("replaced");
+        assert_eq!(fs::read_to_string(run.recipe()).expect("a recipe"), "second");
+        assert!(path.join("mine.txt").exists(), "what is not the run's stays");
+        fs::remove_file(run.recipe()).expect("no longer a run");
+        let refused = RunDirectory::create(&path, "third", true).expect_err("not a run");
+        assert!(matches!(refused, RunError::NotARun(_)), "{refused}");
+        assert!(matches!(RunDirectory::open(&path), Err(RunError::Missing(_))));
+    }
+}

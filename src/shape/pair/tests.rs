@@ -1,0 +1,221 @@
+//! Tests of the preparation of a pair.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use super::*;
+use crate::shape::testing::{sphere_cloud, tetrahedron};
+
+/// The corner of a cube as OBJ, scaled and moved; `inwards` turns every triangle around.
+fn write_tetrahedron(path: &Path, scale: f64, inwards: bool, faces: usize) {
+    let (vertices, triangles) = tetrahedron(0.0);
+    let mut text = String::new();
+    for [x, y, z] in vertices {
+        writeln!(text, "v {} {} {}", scale * x + 5e5, scale * y, scale * z).expect("grows");
+    }
+    for [a, b, c] in &triangles[..faces] {
+        let (b, c) = if inwards { (c, b) } else { (b, c) };
+        writeln!(text, "f {} {} {}", a + 1, b + 1, c + 1).expect("grows");
+    }
+    std::fs::write(path, text).expect("written");
+}
+
+fn write_cloud(path: &Path, points: &[[f64; 3]], normals: Option<&[[f64; 3]]>) {
+    let mut text = String::new();
+    for [x, y, z] in points {
+        writeln!(text, "v {x} {y} {z}").expect("grows");
+    }
+    for [x, y, z] in normals.unwrap_or_default() {
+        writeln!(text, "vn {x} {y} {z}").expect("grows");
+    }
+    std::fs::write(path, text).expect("written");
+}
+
+/// Two tetrahedra in a folder of their own, the second twice as large, and options for them.
+fn tetrahedra() -> (tempfile::TempDir, DataOptions) {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let options = DataOptions {
+        source: folder.path().join("a.obj"),
+        target: folder.path().join("b.obj"),
+        correspondences: CorrespondenceSource::SameVertices,
+        points: 1000,
+        correspondence_fraction: 0.05,
+        normals: NormalSource::Auto,
+        seed: 9,
+    };
+    write_tetrahedron(&options.source, 1.0, false, 4);
+    write_tetrahedron(&options.target, 2.0, false, 4);
+    (folder, options)
+}
+
+/// The point in the user's coordinates relative to the corner of the tetrahedron.
+fn relative(pair: &Pair, point: [f32; 3]) -> [f64; 3] {
+    let [x, y, z] = pair.normalisation.invert(point);
+    [x - 5e5, y, z]
+}
+
+#[test]
+fn shared_triangles_give_surface_pairs_at_equal_barycentric_coordinates() {
+    let (_folder, options) = tetrahedra();
+    let pair = prepare(&options).expect("prepared");
+    assert_eq!(pair.source.points.len(), 1000);
+    assert_eq!(pair.correspondences.len(), 50);
+    assert_eq!(pair.notes, Vec::<String>::new());
+    for &(from, to) in &pair.correspondences {
+        let (from, to) = (relative(&pair, from), relative(&pair, to));
+        for axis in 0..3 {
+            // Float32 in a frame two units wide.
+            assert!(
+                (2.0 * from[axis] - to[axis]).abs() < 1e-6,
+                "{from:?} {to:?}"
+            );
+        }
+    }
+    // Not merely the vertices: there are only four.
+    assert!(
+        pair.correspondences
+            .iter()
+            .any(|&(from, _)| relative(&pair, from)[0] % 1.0 > 0.01)
+    );
+}
+
+#[test]
+fn the_same_options_give_the_same_pair_and_another_seed_another() {
+    let (_folder, mut options) = tetrahedra();
+    let first = prepare(&options).expect("prepared");
+    assert_eq!(prepare(&options).expect("prepared"), first);
+    options.seed = 10;
+    let second = prepare(&options).expect("prepared");
+    assert_ne!(second.source.points, first.source.points);
+    assert_ne!(first.source.points, first.target.points);
+    assert_eq!(second.normalisation, first.normalisation);
+}
+
+#[test]
+fn pairs_from_a_file_are_used_up_to_the_fraction() {
+    let (folder, mut options) = tetrahedra();
+    let path = folder.path().join("pairs.csv");
+    std::fs::write(&path, "0,0\n1,3\n2,2\n").expect("written");
+    options.correspondences = CorrespondenceSource::File(path);
+    let pair = prepare(&options).expect("prepared");
+    let places = |(from, to)| (relative(&pair, from), relative(&pair, to));
+    let round = |x: [f64; 3]| x.map(|coordinate| (coordinate * 1e5).round() / 1e5);
+    let (from, to) = places(pair.correspondences[1]);
+    assert_eq!((round(from), round(to)), ([1.0, 0.0, 0.0], [0.0, 0.0, 2.0]));
+    assert_eq!(pair.correspondences.len(), 3);
+    options.correspondence_fraction = 0.002;
+    assert_eq!(
+        prepare(&options).expect("prepared").correspondences.len(),
+        2
+    );
+    for fraction in [0.0, -1.0, f64::NAN] {
+        options.correspondence_fraction = fraction;
+        let text = prepare(&options).expect_err("none left").to_string();
+        assert!(
+            text.starts_with("data.correspondence-fraction = "),
+            "{text}"
+        );
+    }
+    options.correspondences = CorrespondenceSource::None;
+    assert!(
+        prepare(&options)
+            .expect("prepared")
+            .correspondences
+            .is_empty()
+    );
+}
+
+#[test]
+fn a_mesh_wound_inwards_has_its_normals_flipped_unless_told_not_to() {
+    let (_folder, mut options) = tetrahedra();
+    let outward = prepare(&options).expect("prepared").source.normals;
+    write_tetrahedron(&options.source, 1.0, true, 4);
+    let pair = prepare(&options).expect("prepared");
+    assert_eq!(pair.notes.len(), 1);
+    assert!(
+        pair.notes[0].contains("a.obj: triangles are wound inwards"),
+        "{:?}",
+        pair.notes
+    );
+    let inside = |normals: &Option<Vec<[f32; 3]>>| {
+        let normals = normals.as_ref().expect("normals").iter();
+        // The slanted face is the only one whose outward normal has positive coordinates.
+        normals
+            .filter(|normal| normal.iter().any(|&x| x > 0.01) != (normal[0] > 0.5))
+            .count()
+    };
+    assert_eq!([inside(&outward), inside(&pair.source.normals)], [0, 0]);
+    options.normals = NormalSource::Given;
+    let given = prepare(&options).expect("prepared");
+    assert!(inside(&given.source.normals) > 0, "as wound");
+    options.normals = NormalSource::None;
+    assert_eq!(prepare(&options).expect("prepared").source.normals, None);
+}
+
+#[test]
+fn an_open_mesh_and_one_wound_both_ways_are_noted() {
+    let (_folder, options) = tetrahedra();
+    write_tetrahedron(&options.source, 1.0, false, 3);
+    let text = std::fs::read_to_string(&options.target).expect("read");
+    let turned = text.replacen("f 1 3 2", "f 1 2 3", 1);
+    assert_ne!(text, turned);
+    std::fs::write(&options.target, turned).expect("written");
+    let notes = prepare(&options).expect("prepared").notes;
+    assert!(
+        notes[0].contains("a.obj: the mesh is not closed (3 open edges"),
+        "{notes:?}"
+    );
+    assert!(
+        notes[1].contains("b.obj: triangles are wound against each other at 3"),
+        "{notes:?}"
+    );
+}
+
+#[test]
+fn a_cloud_is_used_as_it_is_with_its_own_normals_or_estimated_ones() {
+    let (_folder, mut options) = tetrahedra();
+    let points = sphere_cloud(500, 2.0, 31);
+    let inward: Vec<_> = points.iter().map(|point| point.map(|x| -x)).collect();
+    write_cloud(&options.source, &points, Some(&inward));
+    write_cloud(&options.target, &points, None);
+    let pair = prepare(&options).expect("prepared");
+    assert_eq!(pair.source.points.len(), 500);
+    // 5 % of the 500 points there are, not of the 1,000 asked of meshes.
+    assert_eq!(pair.correspondences.len(), 25);
+    assert!(
+        pair.notes[0].contains("b.obj: the file has no normals: estimated"),
+        "{:?}",
+        pair.notes
+    );
+    let outward = |cloud: &Cloud| {
+        let normals = cloud.normals.as_ref().expect("normals");
+        let pairs = cloud.points.iter().zip(normals);
+        pairs
+            .filter(|(p, n)| p.iter().zip(*n).map(|(p, n)| p * n).sum::<f32>() > 0.0)
+            .count()
+    };
+    assert_eq!([outward(&pair.source), outward(&pair.target)], [0, 500]);
+    options.normals = NormalSource::Given;
+    let text = prepare(&options).expect_err("no normals").to_string();
+    assert!(
+        text.contains("b.obj: the file has no normals; set data.normals"),
+        "{text}"
+    );
+    options.normals = NormalSource::Estimate;
+    let pair = prepare(&options).expect("prepared");
+    assert_eq!([outward(&pair.source), outward(&pair.target)], [500, 500]);
+}
+
+#[test]
+fn the_bounds_hold_every_point_of_both() {
+    let (_folder, mut options) = tetrahedra();
+    let pair = prepare(&options).expect("prepared");
+    for point in pair.source.points.iter().chain(&pair.target.points) {
+        assert_eq!(pair.bounds.union(&Bounds::of(&[*point])), pair.bounds);
+    }
+    // And no more: half of a box this size would not.
+    assert_ne!(pair.bounds, Bounds::of(&pair.source.points));
+    options.points = 63;
+    let text = prepare(&options).expect_err("too few").to_string();
+    assert_eq!(text, "data.points = 63: must be 64 or more");
+}

@@ -1,0 +1,173 @@
+//! The connected pieces of a surface, and filters that drop the small ones.
+//!
+//! Extraction keeps every piece; a filter is the user's choice.
+
+use super::SurfaceMesh;
+
+/// A connected piece of a mesh.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Component {
+    /// Indices of its triangles in the mesh, ascending.
+    pub triangles: Vec<usize>,
+    /// Its area in squared units of the coordinates.
+    pub area: f64,
+}
+
+impl SurfaceMesh {
+    /// The connected pieces, largest area first; triangles that share a vertex are connected.
+    #[must_use]
+    pub fn components(&self) -> Vec<Component> {
+        let mut parents: Vec<u32> = (0..self.vertices.len() as u32).collect();
+        for &[a, b, c] in &self.triangles {
+            join(&mut parents, a, b);
+            join(&mut parents, a, c);
+        }
+        let mut piece_of_root = vec![None; self.vertices.len()];
+        let mut pieces: Vec<Component> = Vec::new();
+        for (i, &triangle) in self.triangles.iter().enumerate() {
+            let root = root(&mut parents, triangle[0]) as usize;
+            let piece = *piece_of_root[root].get_or_insert_with(|| {
+                pieces.push(Component {
+                    triangles: Vec::new(),
+                    area: 0.0,
+                });
+                pieces.len() - 1
+            });
+            pieces[piece].triangles.push(i);
+            pieces[piece].area += self.triangle_area(triangle);
+        }
+        // Stable: pieces of equal area stay in the order of their first triangles.
+        pieces.sort_by(|a, b| b.area.total_cmp(&a.area));
+        pieces
+    }
+
+    /// The `count` pieces of largest area.
+    #[must_use]
+    pub fn keep_largest(&self, count: usize) -> Self {
+        let pieces = self.components();
+        self.only(&pieces[..count.min(pieces.len())])
+    }
+
+    /// The pieces that have at least `share` of the whole area; 0 keeps all, more than 1 none.
+    #[must_use]
+    pub fn keep_at_least(&self, share: f64) -> Self {
+        let mut pieces = self.components();
+        let least = share * pieces.iter().map(|piece| piece.area).sum::<f64>();
+        pieces.retain(|piece| piece.area >= least);
+        self.only(&pieces)
+    }
+
+    /// The mesh of some of its pieces, without vertices that no triangle uses; the order of
+    /// vertices and triangles is kept.
+    fn only(&self, pieces: &[Component]) -> Self {
+        let mut kept: Vec<usize> = pieces
+            .iter()
+            .flat_map(|piece| &piece.triangles)
+            .copied()
+            .collect();
+        kept.sort_unstable();
+        let mut used = vec![false; self.vertices.len()];
+        for vertex in kept.iter().flat_map(|&i| self.triangles[i]) {
+            used[vertex as usize] = true;
+        }
+        let mut renumbered = vec![0; self.vertices.len()];
+        let old: Vec<usize> = (0..self.vertices.len())
+            .filter(|&vertex| used[vertex])
+            .collect();
+        for (new, &vertex) in old.iter().enumerate() {
+            renumbered[vertex] = new as u32;
+        }
+        let pick = |values: &Vec<[f32; 3]>| old.iter().map(|&vertex| values[vertex]).collect();
+        let renumber = |i: usize| self.triangles[i].map(|vertex| renumbered[vertex as usize]);
+        Self {
+            vertices: pick(&self.vertices),
+            triangles: kept.into_iter().map(renumber).collect(),
+            normals: self.normals.as_ref().map(pick),
+        }
+    }
+}
+
+/// The vertex that stands for the piece of `vertex`; shortens the way there for the next time.
+fn root(parents: &mut [u32], mut vertex: u32) -> u32 {
+    while parents[vertex as usize] != vertex {
+        let above = parents[parents[vertex as usize] as usize];
+        parents[vertex as usize] = above;
+        vertex = above;
+    }
+    vertex
+}
+
+fn join(parents: &mut [u32], a: u32, b: u32) {
+    let (a, b) = (root(parents, a), root(parents, b));
+    parents[a.max(b) as usize] = a.min(b);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Right triangles with legs of these lengths, apart from each other, two vertices swapped
+    /// in so that pieces are interleaved, and one vertex that nothing uses.
+    fn scattered(legs: &[f32]) -> SurfaceMesh {
+        let mut mesh = SurfaceMesh {
+            vertices: vec![[9.0; 3]],
+            ..SurfaceMesh::default()
+        };
+        for (i, &leg) in legs.iter().enumerate() {
+            let (at, first) = (10.0 * i as f32, mesh.vertices.len() as u32);
+            mesh.vertices
+                .extend([[at, 0.0, 0.0], [at + leg, 0.0, 0.0], [at, leg, 0.0]]);
+            mesh.triangles.push([first, first + 1, first + 2]);
+        }
+        mesh.normals = Some(
+            mesh.vertices
+                .iter()
+                .map(|&[x, _, _]| [0.0, x, 1.0])
+                .collect(),
+        );
+        mesh
+    }
+
+    #[test]
+    fn pieces_come_largest_first_with_their_areas() {
+        let pieces = scattered(&[1.0, 3.0, 2.0]).components();
+        let found: Vec<_> = pieces
+            .iter()
+            .map(|piece| (piece.triangles.clone(), piece.area))
+            .collect();
+        assert_eq!(found, [(vec![1], 4.5), (vec![2], 2.0), (vec![0], 0.5)]);
+    }
+
+    #[test]
+    fn triangles_that_share_a_vertex_are_one_piece() {
+        let mut mesh = scattered(&[1.0, 3.0, 2.0]);
+        mesh.triangles.push([9, 4, 1]);
+        assert_eq!(mesh.components().len(), 1);
+    }
+
+    #[test]
+    fn filters_keep_order_and_normals_and_drop_unused_vertices() {
+        let mesh = scattered(&[1.0, 3.0, 2.0]);
+        let kept = mesh.keep_largest(2);
+        assert_eq!(kept.triangles, [[0, 1, 2], [3, 4, 5]]);
+        assert_eq!(kept.vertices, mesh.vertices[4..]);
+        assert_eq!(
+            kept.normals.as_deref(),
+            mesh.normals.as_ref().map(|normals| &normals[4..])
+        );
+        // Areas 0.5, 4.5 and 2 of 7 in all.
+        assert_eq!(mesh.keep_at_least(0.25), kept);
+        assert_eq!(mesh.keep_at_least(0.0).triangles.len(), 3);
+        assert!(mesh.keep_at_least(1.1).triangles.is_empty());
+        assert_eq!(mesh.keep_largest(9).triangles.len(), 3);
+    }
+
+    #[test]
+    fn an_empty_mesh_has_no_pieces() {
+        assert!(SurfaceMesh::default().components().is_empty());
+        assert_eq!(
+            SurfaceMesh::default().keep_largest(1),
+            SurfaceMesh::default()
+        );
+    }
+}

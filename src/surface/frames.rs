@@ -1,0 +1,289 @@
+//! The surfaces of a trained run at chosen times, as files: the zero set of `f(., t)` with normals from
+//! `grad f`, and the input mesh's own vertices carried along `V`.
+//!
+//! Everything is written in the user's coordinates. `frames.json` lists the files:
+//! `[{"time": t, "surface": "surface-000.ply", "carried": "carried-000.ply"}, …]`.
+
+use std::convert::Infallible;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use burn::tensor::{Tensor, backend::Backend};
+use isomorph_model::operators::{Derivatives, Operators};
+use isomorph_model::trajectory::{Integrator, Steps, integrate};
+use isomorph_model::{ImplicitNet, ModelBackend, VelocityNet};
+use serde::{Deserialize, Serialize};
+
+use super::SurfaceMesh;
+use super::carry::{CarryError, rewrite_vertices};
+use super::extract::{ExtractError, Grid, GridError, extract};
+use super::write::{SurfaceFormat, SurfaceView, WriteError, write_surface};
+use crate::atomic::write_atomically;
+use crate::shape::{self, Bounds, Normalisation, ShapeError};
+use crate::tensors::rows;
+
+/// Points per evaluation of a network: enough to fill two cores, small enough to stay in their caches.
+const CHUNK: usize = 8192;
+
+/// Steps of the Runge-Kutta integrator per unit of time by which vertices are carried.
+const CARRY_STEPS: f64 = 32.0;
+
+/// A trained pair of networks and the frame that they live in.
+#[derive(Clone, Debug)]
+pub struct Trained<B: Backend> {
+    /// The Implicit-Net.
+    pub implicit: ImplicitNet<B>,
+    /// The Velocity-Net.
+    pub velocity: VelocityNet<B>,
+    /// From the user's coordinates to the networks'.
+    pub normalisation: Normalisation,
+    /// The box in which the surface is looked for, normalised.
+    pub bounds: Bounds,
+    /// Where tensors live.
+    pub device: B::Device,
+}
+
+/// What to write.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FrameOptions {
+    /// The times, in `[0, 1]`, in the order of the files.
+    pub times: Vec<f64>,
+    /// Cells along the longest side of the box.
+    pub resolution: usize,
+    /// The kind of the surface files.
+    pub format: SurfaceFormat,
+    /// The mesh or cloud whose vertices are carried too, if any.
+    pub carry: Option<PathBuf>,
+    /// Pieces with less than this share of a surface's area are left out; 0 keeps all.
+    pub smallest_component: f64,
+    /// The folder that the files go to.
+    pub folder: PathBuf,
+}
+
+/// One entry of `frames.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FrameEntry {
+    /// The time, 0 to 1.
+    pub time: f64,
+    /// The surface's file, relative to `frames.json`.
+    pub surface: String,
+    /// The carried mesh's file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub carried: Option<String>,
+}
+
+/// A surface that has been written.
+#[derive(Clone, Debug)]
+pub struct Frame {
+    /// Its entry in `frames.json`.
+    pub entry: FrameEntry,
+    /// The surface in normalised coordinates.
+    pub mesh: SurfaceMesh,
+    /// Connected pieces.
+    pub components: usize,
+    /// Whether it reaches the box, and so may be open there.
+    pub touches_box: bool,
+    /// The share of the grid's nodes at which f was evaluated.
+    pub evaluated: f64,
+}
+
+/// Why a frame cannot be written.
+#[derive(Debug, thiserror::Error)]
+pub enum FramesError {
+    /// The grid cannot be made.
+    #[error(transparent)]
+    Grid(#[from] GridError),
+    /// No surface at a time.
+    #[error("time {time}: {source}")]
+    Extract {
+        /// The time.
+        time: f64,
+        /// Why.
+        source: ExtractError<Infallible>,
+    },
+    /// The shape to be carried cannot be read.
+    #[error(transparent)]
+    Shape(#[from] ShapeError),
+    /// The carried shape cannot be written.
+    #[error(transparent)]
+    Carry(#[from] CarryError),
+    /// A surface cannot be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    /// `frames.json` cannot be written, or an event cannot be recorded.
+    #[error(transparent)]
+    Io(#[from] io::Error),
+}
+
+/// Writes the frames and `frames.json`; `done` is told of each and may stop the work by returning false.
+///
+/// # Errors
+/// [`FramesError`]; `frames.json` is written last, so a folder with one is complete.
+pub fn write_frames<B: ModelBackend>(
+    trained: &Trained<B>,
+    options: &FrameOptions,
+    mut done: impl FnMut(&Frame) -> io::Result<bool>,
+) -> Result<Vec<Frame>, FramesError> {
+    let grid = Grid::new(trained.bounds.min, trained.bounds.max, options.resolution)?;
+    let carried = match &options.carry {
+        Some(source) => carry(trained, source, options)?,
+        None => vec![None; options.times.len()],
+    };
+    let mut frames = Vec::new();
+    for (k, (&time, carried)) in options.times.iter().zip(carried).enumerate() {
+        let surface = format!("surface-{k:03}.{}", options.format.extension());
+        let (mesh, touches_box, evaluated) = surface_at(trained, &grid, time)?;
+        let mesh = if options.smallest_component > 0.0 {
+            mesh.keep_at_least(options.smallest_component)
+        } else {
+            mesh
+        };
+        let normals = normals(trained, &mesh.vertices, time);
+        let in_users: Vec<[f64; 3]> = mesh
+            .vertices
+            .iter()
+            .map(|x| trained.normalisation.invert(*x))
+            .collect();
+        let view = SurfaceView {
+            vertices: &in_users,
+            triangles: &mesh.triangles,
+            normals: Some(&normals),
+        };
+        write_surface(view, &options.folder.join(&surface), options.format)?;
+        let components = mesh.components().len();
+        let entry = FrameEntry {
+            time,
+            surface,
+            carried,
+        };
+        let frame = Frame {
+            entry,
+            mesh,
+            components,
+            touches_box,
+            evaluated,
+        };
+        let go_on = done(&frame)?;
+        frames.push(frame);
+        if !go_on {
+            return Ok(frames);
+        }
+    }
+    let entries: Vec<&FrameEntry> = frames.iter().map(|frame| &frame.entry).collect();
+    let text = serde_json::to_string_pretty(&entries).map_err(io::Error::other)?;
+    write_atomically(&options.folder.join("frames.json"), |out| {
+        out.write_all(text.as_bytes())
+    })?;
+    Ok(frames)
+}
+
+/// The zero set at a time, whether it touches the box, and the share of the grid that was evaluated.
+fn surface_at<B: ModelBackend>(
+    trained: &Trained<B>,
+    grid: &Grid,
+    time: f64,
+) -> Result<(SurfaceMesh, bool, f64), FramesError> {
+    let field = |points: &[[f32; 3]]| {
+        let values = in_chunks(points, &trained.device, |x| {
+            let t = Tensor::full([x.dims()[0], 1], time, &trained.device);
+            trained.implicit.forward(x, t)
+        });
+        Ok::<_, Infallible>(values)
+    };
+    let found = extract(field, grid).map_err(|source| FramesError::Extract { time, source })?;
+    let share = found.evaluated as f64 / found.grid_points as f64;
+    Ok((found.mesh, found.touches_box, share))
+}
+
+/// Unit normals `grad f / |grad f|` at points of the surface.
+fn normals<B: ModelBackend>(trained: &Trained<B>, points: &[[f32; 3]], time: f64) -> Vec<[f32; 3]> {
+    let flat = in_chunks(points, &trained.device, |x| {
+        let t = Tensor::full([x.dims()[0], 1], time, &trained.device);
+        // The written-out reverse sweep: on a backend without autodiff it is the only way, and exact.
+        Derivatives::Forward
+            .implicit_jet(&trained.implicit, x, t)
+            .normal()
+    });
+    flat.as_chunks::<3>().0.to_vec()
+}
+
+/// Carries the vertices of a shape through all times and writes a file for each; their names.
+fn carry<B: ModelBackend>(
+    trained: &Trained<B>,
+    source: &Path,
+    options: &FrameOptions,
+) -> Result<Vec<Option<String>>, FramesError> {
+    let shape = shape::read(source)?;
+    let start: Vec<[f32; 3]> = shape
+        .vertices
+        .iter()
+        .map(|x| trained.normalisation.apply(*x))
+        .collect();
+    let extension = source
+        .extension()
+        .and_then(|text| text.to_str())
+        .unwrap_or("ply");
+    let mut order: Vec<usize> = (0..options.times.len()).collect();
+    order.sort_by(|a, b| options.times[*a].total_cmp(&options.times[*b]));
+    let mut names = vec![None; options.times.len()];
+    let (mut now, mut at) = (start.clone(), 0.0);
+    for k in order {
+        let time = options.times[k];
+        now = carried_on(trained, &now, at, time);
+        at = time;
+        // The displacement is added to the vertex as it was read, so that time 0 gives the input back.
+        let moved: Vec<[f64; 3]> = (shape.vertices.iter().zip(&start).zip(&now))
+            .map(|((vertex, start), now)| {
+                std::array::from_fn(|axis| {
+                    let by = f64::from(now[axis]) - f64::from(start[axis]);
+                    vertex[axis] + by / trained.normalisation.scale
+                })
+            })
+            .collect();
+        let name = format!("carried-{k:03}.{extension}");
+        rewrite_vertices(source, &moved, &options.folder.join(&name))?;
+        names[k] = Some(name);
+    }
+    Ok(names)
+}
+
+/// Positions at time `to` of points that are at `x` at time `from`.
+pub fn carried_on<B: ModelBackend>(
+    trained: &Trained<B>,
+    x: &[[f32; 3]],
+    from: f64,
+    to: f64,
+) -> Vec<[f32; 3]> {
+    if from == to {
+        return x.to_vec();
+    }
+    let steps = Steps::Even(((to - from).abs() * CARRY_STEPS).ceil() as usize);
+    let flat = in_chunks(x, &trained.device, |x| {
+        let full = |time: f64| Tensor::full([x.dims()[0], 1], time, &trained.device);
+        let (from, to) = (full(from), full(to));
+        integrate(
+            |x, t| trained.velocity.forward(x, t),
+            x,
+            from,
+            to,
+            steps,
+            Integrator::Rk4,
+        )
+    });
+    flat.as_chunks::<3>().0.to_vec()
+}
+
+/// Evaluates `map` on points, a chunk at a time, and reads the results back.
+fn in_chunks<B: ModelBackend>(
+    points: &[[f32; 3]],
+    device: &B::Device,
+    map: impl Fn(Tensor<B, 2>) -> Tensor<B, 2>,
+) -> Vec<f32> {
+    let values = points.chunks(CHUNK).flat_map(|chunk| {
+        map(rows::<B>(chunk, device))
+            .into_data()
+            .iter::<f32>()
+            .collect::<Vec<_>>()
+    });
+    values.collect()
+}
