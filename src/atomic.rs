@@ -20,7 +20,9 @@ pub fn write_atomically(
     };
     let whole = || -> io::Result<()> {
         std::fs::create_dir_all(folder)?;
-        let temporary = tempfile::Builder::new().prefix(".isomorph-").tempfile_in(folder)?;
+        let temporary = tempfile::Builder::new()
+            .prefix(".isomorph-")
+            .tempfile_in(folder)?;
         let mut buffered = BufWriter::with_capacity(1 << 16, temporary.as_file());
         write(&mut buffered)?;
         buffered.flush()?;
@@ -59,9 +61,14 @@ mod tests {
             Err(io::Error::other("the disk is full"))
         });
         let message = refused.expect_err("the write failed").to_string();
-        assert!(message.contains("result.txt") && message.contains("disk is full"), "{message}");
+        assert!(
+            message.contains("result.txt") && message.contains("disk is full"),
+            "{message}"
+        );
         assert_eq!(std::fs::read(&path).expect("still there"), b"first");
-        let left = std::fs::read_dir(path.parent().expect("a parent")).expect("a folder").count();
+        let left = std::fs::read_dir(path.parent().expect("a parent"))
+            .expect("a folder")
+            .count();
         assert_eq!(left, 1, "the temporary file is gone");
     }
 }

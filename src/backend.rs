@@ -48,7 +48,9 @@ pub enum BackendError {
         allowed: &'static str,
     },
     /// The driver gave no device.
-    #[error("--backend {backend}: no device could be opened ({problem}); install a GPU driver (or mesa-vulkan-drivers for one in software), or use --backend ndarray")]
+    #[error(
+        "--backend {backend}: no device could be opened ({problem}); install a GPU driver (or mesa-vulkan-drivers for one in software), or use --backend ndarray"
+    )]
     NoDevice {
         /// The backend.
         backend: &'static str,
@@ -139,7 +141,14 @@ fn opens<B: Backend>(backend: &'static str, device: &B::Device) -> Result<(), Ba
     opened.map_err(|panic| {
         let text = panic.downcast_ref::<String>().map(String::as_str);
         let text = text.or_else(|| panic.downcast_ref::<&str>().copied());
-        let problem = text.unwrap_or("the driver gave no reason").lines().next().unwrap_or_default();
-        BackendError::NoDevice { backend, problem: problem.to_owned() }
+        let problem = text
+            .unwrap_or("the driver gave no reason")
+            .lines()
+            .next()
+            .unwrap_or_default();
+        BackendError::NoDevice {
+            backend,
+            problem: problem.to_owned(),
+        }
     })
 }

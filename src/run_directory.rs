@@ -12,10 +12,14 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
     /// Something is there already.
-    #[error("{0}: exists already; resume it with `isomorph resume {0}`, choose another with --run, or replace it with --force")]
+    #[error(
+        "{0}: exists already; resume it with `isomorph resume {0}`, choose another with --run, or replace it with --force"
+    )]
     Exists(PathBuf),
     /// Something is there that is not a run, which --force does not delete.
-    #[error("{0}: exists and is not a run (it has no recipe.toml), so --force leaves it alone; choose another folder with --run")]
+    #[error(
+        "{0}: exists and is not a run (it has no recipe.toml), so --force leaves it alone; choose another folder with --run"
+    )]
     NotARun(PathBuf),
     /// Not a run.
     #[error("{0}: not a run: it has no recipe.toml; give the folder that `isomorph train` made")]
@@ -40,7 +44,10 @@ impl RunDirectory {
     /// # Errors
     /// [`RunError`]; with `force` an older run there is deleted first, and nothing but a run ever is.
     pub fn create(path: &Path, recipe: &str, force: bool) -> Result<Self, RunError> {
-        let io = |source| RunError::Io { path: path.to_path_buf(), source };
+        let io = |source| RunError::Io {
+            path: path.to_path_buf(),
+            source,
+        };
         let occupied = match fs::read_dir(path) {
             Ok(mut entries) => entries.next().is_some(),
             Err(error) if error.kind() == io::ErrorKind::NotFound => false,
@@ -68,7 +75,11 @@ impl RunDirectory {
     /// [`RunError::Missing`] if it holds no recipe.
     pub fn open(path: &Path) -> Result<Self, RunError> {
         let run = Self(path.to_path_buf());
-        if run.recipe().is_file() { Ok(run) } else { Err(RunError::Missing(path.to_path_buf())) }
+        if run.recipe().is_file() {
+            Ok(run)
+        } else {
+            Err(RunError::Missing(path.to_path_buf()))
+        }
     }
 
     /// The folder itself.
@@ -121,11 +132,20 @@ mod tests {
         let refused = RunDirectory::create(&path, "second", false).expect_err("it exists");
         assert!(refused.to_string().contains("--force"), "{refused}");
         let run = RunDirectory::create(&path, "second", true).expect("replaced");
-        assert_eq!(fs::read_to_string(run.recipe()).expect("a recipe"), "second");
-        assert!(path.join("mine.txt").exists(), "what is not the run's stays");
+        assert_eq!(
+            fs::read_to_string(run.recipe()).expect("a recipe"),
+            "second"
+        );
+        assert!(
+            path.join("mine.txt").exists(),
+            "what is not the run's stays"
+        );
         fs::remove_file(run.recipe()).expect("no longer a run");
         let refused = RunDirectory::create(&path, "third", true).expect_err("not a run");
         assert!(matches!(refused, RunError::NotARun(_)), "{refused}");
-        assert!(matches!(RunDirectory::open(&path), Err(RunError::Missing(_))));
+        assert!(matches!(
+            RunDirectory::open(&path),
+            Err(RunError::Missing(_))
+        ));
     }
 }

@@ -14,7 +14,7 @@
 
 use burn::tensor::backend::{AutodiffBackend, Backend};
 use burn::tensor::ops::FloatTensor;
-use burn::tensor::{Tensor, TensorPrimitive};
+use burn::tensor::{Tensor, TensorData, TensorPrimitive};
 use burn_autodiff::Autodiff;
 use burn_autodiff::checkpoint::base::Checkpointer;
 use burn_autodiff::checkpoint::strategy::CheckpointStrategy;
@@ -55,11 +55,44 @@ fn composed_softplus<B: Backend>(z: Tensor<B, 2>, beta: f64) -> (Tensor<B, 2>, T
     (value, slope)
 }
 
+/// The pair by the kernel of this crate, on a backend whose tensors live in the host's memory.
+#[cfg(any(feature = "ndarray", feature = "flex"))]
+fn host_softplus<B: Backend>(z: FloatTensor<B>, beta: f64) -> (FloatTensor<B>, FloatTensor<B>) {
+    let z = Tensor::<B, 2>::from_primitive(TensorPrimitive::Float(z));
+    let (device, shape) = (z.device(), z.shape());
+    let data = z.into_data();
+    let input = data
+        .as_slice::<f32>()
+        .expect("the CPU backends compute in f32");
+    let (value, slope) = crate::kernel::softplus_and_slope(input, beta as f32);
+    let wrap = |values: Vec<f32>| {
+        let data = TensorData::new(values, shape.clone());
+        Tensor::<B, 2>::from_data(data, &device)
+            .into_primitive()
+            .tensor()
+    };
+    (wrap(value), wrap(slope))
+}
+
 #[cfg(feature = "ndarray")]
-impl ModelBackend for burn_ndarray::NdArray {}
+impl ModelBackend for burn_ndarray::NdArray {
+    fn softplus_and_slope(
+        z: FloatTensor<Self>,
+        beta: f64,
+    ) -> (FloatTensor<Self>, FloatTensor<Self>) {
+        host_softplus::<Self>(z, beta)
+    }
+}
 
 #[cfg(feature = "flex")]
-impl ModelBackend for burn_flex::Flex {}
+impl ModelBackend for burn_flex::Flex {
+    fn softplus_and_slope(
+        z: FloatTensor<Self>,
+        beta: f64,
+    ) -> (FloatTensor<Self>, FloatTensor<Self>) {
+        host_softplus::<Self>(z, beta)
+    }
+}
 
 #[cfg(feature = "wgpu")]
 impl ModelBackend for burn_wgpu::Wgpu {}

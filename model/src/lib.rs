@@ -30,6 +30,8 @@ pub mod backend;
 pub mod encoding;
 mod implicit_net;
 mod initial;
+#[cfg(any(feature = "ndarray", feature = "flex"))]
+mod kernel;
 pub mod loss;
 mod mlp;
 mod objective;

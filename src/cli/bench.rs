@@ -1,5 +1,281 @@
-//! bench
-use clap::Args;
-/// Bench
-#[derive(Debug, Args)] pub(super) struct BenchArgs {}
-pub(super) fn run(_: BenchArgs) -> anyhow::Result<super::Ending> { Ok(super::Ending::Done) }
+//! `isomorph bench`: what a training step costs on this machine.
+
+use std::time::Instant;
+
+use anyhow::Result;
+use burn::tensor::backend::Backend;
+use burn::tensor::{Distribution, Tensor};
+use clap::{Args, ValueEnum};
+use isomorph_model::TrainBackend;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde::Serialize;
+
+use super::{BackendArgs, Ending};
+use crate::backend::{self, Task};
+use crate::learner::Learner;
+use crate::learner::batch::BatchSizes;
+use crate::learner::event::Phase;
+use crate::learner::settings::Settings;
+use crate::learner::{flop, memory};
+use crate::recipe::Recipe;
+use crate::shape::{Bounds, Cloud, Normalisation, Pair};
+
+/// Measure a training step: seconds, arithmetic, memory, and the share of the machine that it uses
+///
+/// The step is that of the paper preset (smoothness with its Laplacian, divergence, level set, Euler's
+/// method) on two spheres of points, at one of three sizes. Efficiency is the rate of the step's matrix
+/// products over the rate of one large matrix product on the same backend.
+#[derive(Debug, Args)]
+pub(super) struct BenchArgs {
+    /// Networks and points
+    #[arg(long, value_enum, default_value_t = Size::Small)]
+    size: Size,
+
+    /// How derivatives by the input are taken
+    #[arg(long, value_enum, default_value_t = Way::Nested)]
+    derivatives: Way,
+
+    /// Steps timed in each phase; the median counts
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    repeats: u32,
+
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+
+    #[command(flatten)]
+    place: BackendArgs,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Size {
+    /// f and V 6x128, 1000 points, 5 time steps
+    Small,
+    /// f and V 8x256, 4086 points, 10 time steps
+    Shipped,
+    /// f 8x512, V 8x256, 4000 points, 10 time steps
+    Paper,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Way {
+    /// Repeated automatic differentiation
+    Nested,
+    /// One forward sweep
+    Forward,
+}
+
+impl Size {
+    /// Depth of both, width of f, width of V, points, time steps.
+    const fn shape(self) -> (usize, usize, usize, usize, usize) {
+        match self {
+            Self::Small => (6, 128, 128, 1000, 5),
+            Self::Shipped => (8, 256, 256, 4086, 10),
+            Self::Paper => (8, 512, 256, 4000, 10),
+        }
+    }
+
+    fn name(self) -> String {
+        self.to_possible_value()
+            .map_or_else(String::new, |value| value.get_name().to_owned())
+    }
+}
+
+#[derive(Debug, Serialize)]
+struct Measured {
+    backend: String,
+    size: String,
+    derivatives: &'static str,
+    phases: Phases,
+    peak_bytes: Option<u64>,
+    matmul_gflops: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct Phases {
+    warm_up: PhaseCost,
+    joint: PhaseCost,
+}
+
+#[derive(Debug, Serialize)]
+struct PhaseCost {
+    seconds_per_step: f64,
+    first_step_seconds: f64,
+    gflop_per_step: f64,
+    efficiency: f64,
+}
+
+pub(super) fn run(args: BenchArgs) -> Result<Ending> {
+    let json = args.json;
+    let place = args.place.clone();
+    let measured = backend::run(place.backend, place.device.as_deref(), args)??;
+    if json {
+        println!("{}", serde_json::to_string(&measured)?);
+    } else {
+        print_table(&measured);
+    }
+    Ok(Ending::Done)
+}
+
+impl Task for BenchArgs {
+    type Output = Result<Measured>;
+
+    fn run<B: TrainBackend>(self, device: B::Device) -> Self::Output {
+        let matmul_gflops = matmul_rate::<B::InnerBackend>(&device);
+        let derivatives = match self.derivatives {
+            Way::Nested => "nested",
+            Way::Forward => "forward",
+        };
+        let cost = |phase, warm_up: &str| -> Result<PhaseCost> {
+            let recipe = recipe(self.size, derivatives, warm_up)?;
+            Ok(measure::<B>(
+                recipe,
+                phase,
+                self.repeats as usize,
+                matmul_gflops,
+                &device,
+            ))
+        };
+        let phases = Phases {
+            warm_up: cost(Phase::WarmUp, "1")?,
+            joint: cost(Phase::Joint, "0")?,
+        };
+        Ok(Measured {
+            backend: B::InnerBackend::name(&device),
+            size: self.size.name(),
+            derivatives,
+            phases,
+            peak_bytes: memory::peak_memory_bytes(),
+            matmul_gflops,
+        })
+    }
+}
+
+/// The paper preset at a size, all of its steps in one phase.
+fn recipe(size: Size, derivatives: &str, warm_up: &str) -> Result<Recipe> {
+    let (depth, width_f, width_v, points, time_steps) = size.shape();
+    let text = "preset = \"paper\"\n[data]\nsource = \"spheres\"\ntarget = \"spheres\"\n";
+    let set = [
+        format!("implicit.depth={depth}"),
+        format!("implicit.width={width_f}"),
+        format!("velocity.depth={depth}"),
+        format!("velocity.width={width_v}"),
+        format!("training.batch={points}"),
+        format!("training.time-steps={time_steps}"),
+        format!("training.derivatives={derivatives}"),
+        format!("training.warm-up={warm_up}"),
+        format!("training.ramp-until={warm_up}"),
+        "training.velocity-until=1".to_owned(),
+    ];
+    Ok(Recipe::parse(text, std::path::Path::new("bench"), &set)?)
+}
+
+/// The median time of a step after a first one that is reported apart: it compiles kernels on a GPU.
+fn measure<B: TrainBackend>(
+    recipe: Recipe,
+    phase: Phase,
+    repeats: usize,
+    matmul_gflops: f64,
+    device: &B::Device,
+) -> PhaseCost {
+    let settings = Settings::new(&recipe);
+    let pair = spheres();
+    let sizes = BatchSizes::new(&settings.training, pair.correspondences.len());
+    let gflop_per_step = flop::per_step(&settings, sizes, phase) / 1e9;
+    let mut learner = Learner::<B>::new(recipe, pair, device.clone());
+    let mut step = || {
+        let clock = Instant::now();
+        learner.advance(false);
+        // A device that fails shows in the next value read from it.
+        let _ = B::sync(device);
+        clock.elapsed().as_secs_f64()
+    };
+    let first_step_seconds = step();
+    let seconds_per_step = median((0..repeats).map(|_| step()).collect());
+    let efficiency = gflop_per_step / seconds_per_step / matmul_gflops;
+    PhaseCost {
+        seconds_per_step,
+        first_step_seconds,
+        gflop_per_step,
+        efficiency,
+    }
+}
+
+/// GFLOP per second of a product of `4000 x 512` by `512 x 512`, the median of seven.
+fn matmul_rate<B: Backend>(device: &B::Device) -> f64 {
+    let matrix = |rows| Tensor::<B, 2>::random([rows, 512], Distribution::Default, device);
+    let (a, b) = (matrix(4000), matrix(512));
+    let multiply = || {
+        let clock = Instant::now();
+        let product = a.clone().matmul(b.clone());
+        let _ = B::sync(device);
+        drop(product);
+        clock.elapsed().as_secs_f64()
+    };
+    multiply();
+    2.0 * 4000.0 * 512.0 * 512.0 / 1e9 / median((0..7).map(|_| multiply()).collect())
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+/// Two clouds of points on spheres a little apart, with normals and correspondences.
+fn spheres() -> Pair {
+    let rng = &mut ChaCha8Rng::seed_from_u64(0);
+    let mut direction = || loop {
+        let d: [f32; 3] = std::array::from_fn(|_| rng.random_range(-1.0..1.0));
+        let length = d.iter().map(|c| c * c).sum::<f32>().sqrt();
+        if (0.1..1.0).contains(&length) {
+            return d.map(|c| c / length);
+        }
+    };
+    let normals: Vec<[f32; 3]> = (0..20_000).map(|_| direction()).collect();
+    let cloud = |offset: f32| Cloud {
+        points: normals
+            .iter()
+            .map(|[x, y, z]| [0.28 * x + offset, 0.28 * y, 0.28 * z])
+            .collect(),
+        normals: Some(normals.clone()),
+    };
+    let (source, target) = (cloud(-0.1), cloud(0.1));
+    let pairs = source
+        .points
+        .iter()
+        .copied()
+        .zip(target.points.iter().copied());
+    Pair {
+        correspondences: pairs.take(1000).collect(),
+        normalisation: Normalisation {
+            centre: [0.0; 3],
+            scale: 1.0,
+        },
+        bounds: Bounds::of(&source.points).union(&Bounds::of(&target.points)),
+        notes: Vec::new(),
+        source,
+        target,
+    }
+}
+
+fn print_table(measured: &Measured) {
+    let peak = measured.peak_bytes.map_or_else(
+        || "unknown".to_owned(),
+        |bytes| format!("{:.0} MB", bytes as f64 / 1e6),
+    );
+    println!(
+        "{}, {}, {} derivatives; matrix product {:.0} GFLOP/s; peak memory {peak}",
+        measured.backend, measured.size, measured.derivatives, measured.matmul_gflops
+    );
+    println!("phase      s/step   first step   GFLOP/step   efficiency");
+    for (name, cost) in [
+        ("warm-up", &measured.phases.warm_up),
+        ("joint", &measured.phases.joint),
+    ] {
+        println!(
+            "{name:9} {:8.4} {:12.3} {:12.2} {:12.2}",
+            cost.seconds_per_step, cost.first_step_seconds, cost.gflop_per_step, cost.efficiency
+        );
+    }
+}

@@ -30,7 +30,12 @@ pub(super) struct ExtractArgs {
     frames: u32,
 
     /// The times themselves, 0 to 1, as in 0.25,0.5
-    #[arg(long, value_name = "A,B,C", value_delimiter = ',', conflicts_with = "frames")]
+    #[arg(
+        long,
+        value_name = "A,B,C",
+        value_delimiter = ',',
+        conflicts_with = "frames"
+    )]
     times: Vec<f64>,
 
     /// Cells along the longest side of the box, 8 to 2048 [default: as in the recipe]
@@ -72,8 +77,11 @@ enum Format {
 pub(super) fn run(args: ExtractArgs) -> Result<Ending> {
     let run = RunDirectory::open(&args.run)?;
     let checkpoint = Checkpoint::newest(&run.checkpoints())?;
-    let times =
-        if args.times.is_empty() { even_times(args.frames as usize) } else { args.times.clone() };
+    let times = if args.times.is_empty() {
+        even_times(args.frames as usize)
+    } else {
+        args.times.clone()
+    };
     if let Some(time) = times.iter().find(|time| !(0.0..=1.0).contains(*time)) {
         return Err(Usage(format!("--times: {time}: must be 0 to 1 (0 is the source)")).into());
     }
@@ -84,7 +92,9 @@ pub(super) fn run(args: ExtractArgs) -> Result<Ending> {
     let recipe = checkpoint.recipe()?;
     let options = FrameOptions {
         times,
-        resolution: args.resolution.map_or(recipe.result.resolution, |cells| cells as usize),
+        resolution: args
+            .resolution
+            .map_or(recipe.result.resolution, |cells| cells as usize),
         format: match args.format {
             Format::Ply => SurfaceFormat::Ply,
             Format::Obj => SurfaceFormat::Obj,
@@ -95,7 +105,11 @@ pub(super) fn run(args: ExtractArgs) -> Result<Ending> {
     };
     let reporter = Reporter::new(&run, Some(usize::MAX), args.quiet.verbosity())?;
     let place = args.place.clone();
-    let task = Extract { checkpoint, options, reporter };
+    let task = Extract {
+        checkpoint,
+        options,
+        reporter,
+    };
     backend::run(place.backend, place.device.as_deref(), task)?
 }
 
@@ -125,7 +139,9 @@ fn load<B: TrainBackend>(
     device: B::Device,
 ) -> Result<Trained<B::InnerBackend>> {
     use burn::module::Module;
-    let recipe = checkpoint.recipe().context("the recipe in the checkpoint")?;
+    let recipe = checkpoint
+        .recipe()
+        .context("the recipe in the checkpoint")?;
     let implicit = settings::implicit(&recipe).init::<B::InnerBackend>(0, &device);
     let velocity = settings::velocity(&recipe).init::<B::InnerBackend>(0, &device);
     Ok(Trained {
@@ -134,7 +150,10 @@ fn load<B: TrainBackend>(
         velocity: velocity
             .load_record(checkpoint.load::<B::InnerBackend, _>(Part::Velocity, &device)?),
         normalisation: checkpoint.state.normalisation,
-        bounds: checkpoint.state.bounds.padded(recipe.training.box_margin as f32),
+        bounds: checkpoint
+            .state
+            .bounds
+            .padded(recipe.training.box_margin as f32),
         device,
     })
 }

@@ -21,7 +21,10 @@ pub(super) struct InfoArgs {
 
 pub(super) fn run(args: InfoArgs) -> Result<Ending> {
     let path = &args.path;
-    let extension = path.extension().and_then(|text| text.to_str()).unwrap_or_default();
+    let extension = path
+        .extension()
+        .and_then(|text| text.to_str())
+        .unwrap_or_default();
     let text = match extension.to_ascii_lowercase().as_str() {
         _ if path.is_dir() => run_info(path)?,
         "anime" => sequence_info(&Sequence::read(path)?),
@@ -34,15 +37,27 @@ pub(super) fn run(args: InfoArgs) -> Result<Ending> {
 
 fn shape_info(shape: &Shape) -> Result<String> {
     let mut text = String::new();
-    let kind = if shape.is_mesh() { "mesh" } else { "point cloud" };
+    let kind = if shape.is_mesh() {
+        "mesh"
+    } else {
+        "point cloud"
+    };
     writeln!(text, "{}: {kind}", shape.path.display())?;
     writeln!(text, "vertices     {}", shape.vertices.len())?;
     writeln!(text, "triangles    {}", shape.triangles.len())?;
-    let normals = if shape.normals.is_some() { "given" } else { "none" };
+    let normals = if shape.normals.is_some() {
+        "given"
+    } else {
+        "none"
+    };
     writeln!(text, "normals      {normals}")?;
     let (low, high) = box_of(&shape.vertices);
     writeln!(text, "box          {low:?} to {high:?}")?;
-    let estimated = if shape.is_mesh() { "" } else { " (estimated from the density)" };
+    let estimated = if shape.is_mesh() {
+        ""
+    } else {
+        " (estimated from the density)"
+    };
     writeln!(text, "area         {:.6}{estimated}", shape.area()?)?;
     if shape.is_mesh() {
         let closed = shape::mesh::EdgeSharing::of(&shape.vertices, &shape.triangles).is_closed();
@@ -69,7 +84,10 @@ fn run_info(path: &Path) -> Result<String> {
     let checkpoints = checkpoint::list(&run.checkpoints());
     let mut text = String::new();
     writeln!(text, "{}: run", path.display())?;
-    let steps: Vec<String> = checkpoints.iter().map(|(step, _)| step.to_string()).collect();
+    let steps: Vec<String> = checkpoints
+        .iter()
+        .map(|(step, _)| step.to_string())
+        .collect();
     if steps.is_empty() {
         writeln!(text, "checkpoints  none yet")?;
         return Ok(text);
@@ -77,15 +95,27 @@ fn run_info(path: &Path) -> Result<String> {
     writeln!(text, "checkpoints  at steps {}", steps.join(", "))?;
     let newest = Checkpoint::newest(&run.checkpoints())?;
     let (state, recipe) = (&newest.state, newest.recipe()?);
-    writeln!(text, "steps        {} of {}", state.step, recipe.training.steps)?;
+    writeln!(
+        text,
+        "steps        {} of {}",
+        state.step, recipe.training.steps
+    )?;
     writeln!(text, "seconds      {:.1}", state.seconds)?;
     writeln!(text, "backend      {}", state.backend)?;
     writeln!(text, "preset       {}", recipe.preset)?;
     writeln!(text, "source       {}", recipe.data.source.display())?;
     writeln!(text, "target       {}", recipe.data.target.display())?;
     let (f, v) = (&recipe.implicit, &recipe.velocity);
-    writeln!(text, "f            {} x {}, {}", f.depth, f.width, f.activation)?;
-    writeln!(text, "V            {} x {}, {}", v.depth, v.width, v.activation)?;
+    writeln!(
+        text,
+        "f            {} x {}, {}",
+        f.depth, f.width, f.activation
+    )?;
+    writeln!(
+        text,
+        "V            {} x {}, {}",
+        v.depth, v.width, v.activation
+    )?;
     let (centre, scale) = (state.normalisation.centre, state.normalisation.scale);
     writeln!(text, "normalised   (x - {centre:?}) * {scale}")?;
     Ok(text)
@@ -95,6 +125,9 @@ fn box_of(vertices: &[[f64; 3]]) -> ([f64; 3], [f64; 3]) {
     let start = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
     vertices.iter().fold(start, |(low, high), vertex| {
         let low = std::array::from_fn(|axis| f64::min(low[axis], vertex[axis]));
-        (low, std::array::from_fn(|axis| f64::max(high[axis], vertex[axis])))
+        (
+            low,
+            std::array::from_fn(|axis| f64::max(high[axis], vertex[axis])),
+        )
     })
 }

@@ -36,7 +36,10 @@ pub(super) fn run(args: InitArgs) -> Result<Ending> {
     }
     let preset = Preset::from_word(&args.preset).ok_or_else(|| {
         let allowed = Preset::WORDS.join(", ");
-        Usage(format!("--preset {}: must be one of {allowed}", args.preset))
+        Usage(format!(
+            "--preset {}: must be one of {allowed}",
+            args.preset
+        ))
     })?;
     let correspondences = match args.correspondences.as_str() {
         "none" => Correspondences::None,

@@ -61,7 +61,7 @@ struct BackendArgs {
 }
 
 /// The fastest backend that runs on every machine.
-const DEFAULT_BACKEND: BackendName = BackendName::Ndarray;
+const DEFAULT_BACKEND: BackendName = BackendName::Flex;
 
 /// Changes of the recipe from the command line.
 #[derive(Clone, Debug, Args)]
@@ -81,7 +81,11 @@ struct QuietArgs {
 
 impl QuietArgs {
     fn verbosity(self) -> Verbosity {
-        if self.quiet { Verbosity::Quiet } else { Verbosity::Normal }
+        if self.quiet {
+            Verbosity::Quiet
+        } else {
+            Verbosity::Normal
+        }
     }
 }
 
@@ -162,6 +166,8 @@ fn stop_on_interrupt() -> anyhow::Result<Arc<AtomicBool>> {
 fn even_times(frames: usize) -> Vec<f64> {
     match frames {
         1 => vec![0.0],
-        _ => (0..frames).map(|k| k as f64 / (frames - 1) as f64).collect(),
+        _ => (0..frames)
+            .map(|k| k as f64 / (frames - 1) as f64)
+            .collect(),
     }
 }

@@ -50,18 +50,29 @@ pub(super) fn run(args: ResumeArgs) -> Result<Ending> {
         None => Vec::new(),
     };
     let pair = shape::prepare(&settings::data(&recipe))?;
-    let step = checkpoint.as_ref().map_or(0, |checkpoint| checkpoint.state.step);
+    let step = checkpoint
+        .as_ref()
+        .map_or(0, |checkpoint| checkpoint.state.step);
     let mut reporter = Reporter::new(&run, Some(step), args.quiet.verbosity())?;
     if checkpoint.is_none() {
         let note = "no checkpoint yet: the run starts again from its first step";
         reporter.handle(&Event::Note(note.to_owned()))?;
     }
     for change in changes.iter().filter(|change| !change.is_of_a_network()) {
-        reporter.handle(&Event::Note(format!("changed since the checkpoint: {change}")))?;
+        reporter.handle(&Event::Note(format!(
+            "changed since the checkpoint: {change}"
+        )))?;
     }
     if !args.set.overrides.is_empty() && !changes.iter().any(|change| change.is_of_a_network()) {
         let text = recipe.to_toml();
         write_atomically(&run.recipe(), |out| out.write_all(text.as_bytes()))?;
     }
-    Training { recipe, pair, run, checkpoint, reporter }.start(&args.place)
+    Training {
+        recipe,
+        pair,
+        run,
+        checkpoint,
+        reporter,
+    }
+    .start(&args.place)
 }

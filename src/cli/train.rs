@@ -52,16 +52,26 @@ pub(super) fn run(args: TrainArgs) -> Result<Ending> {
     for note in &pair.notes {
         reporter.handle(&Event::Note(note.clone()))?;
     }
-    let training = Training { recipe, pair, run, checkpoint: None, reporter };
+    let training = Training {
+        recipe,
+        pair,
+        run,
+        checkpoint: None,
+        reporter,
+    };
     training.start(&args.place)
 }
 
 /// `runs/` and the names of the recipe's folder and of the recipe: `data/fox/quick.toml` trains into
 /// `runs/fox-quick`.
 fn default_run(recipe: &Path) -> PathBuf {
-    let name = |part: Option<&std::ffi::OsStr>| part.map(|text| text.to_string_lossy().into_owned());
+    let name =
+        |part: Option<&std::ffi::OsStr>| part.map(|text| text.to_string_lossy().into_owned());
     let whole = std::path::absolute(recipe).unwrap_or_else(|_| recipe.to_path_buf());
-    let parts = [name(whole.parent().and_then(Path::file_name)), name(whole.file_stem())];
+    let parts = [
+        name(whole.parent().and_then(Path::file_name)),
+        name(whole.file_stem()),
+    ];
     Path::new("runs").join(parts.into_iter().flatten().collect::<Vec<_>>().join("-"))
 }
 
@@ -71,6 +81,9 @@ mod tests {
 
     #[test]
     fn a_run_is_named_after_its_recipe() {
-        assert_eq!(default_run(Path::new("data/fox/quick.toml")), Path::new("runs/fox-quick"));
+        assert_eq!(
+            default_run(Path::new("data/fox/quick.toml")),
+            Path::new("runs/fox-quick")
+        );
     }
 }

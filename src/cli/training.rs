@@ -16,7 +16,7 @@ use crate::recipe::Recipe;
 use crate::report::{Reporter, picture};
 use crate::run_directory::RunDirectory;
 use crate::shape::Pair;
-use crate::surface::frames::{FrameOptions, Frame, Trained, write_frames};
+use crate::surface::frames::{Frame, FrameOptions, Trained, write_frames};
 use crate::surface::write::SurfaceFormat;
 
 /// One run, from its first step or from a checkpoint.
@@ -32,7 +32,10 @@ impl Training {
     /// Trains to the end, then writes the surfaces that the recipe asks for.
     pub(super) fn start(self, place: &BackendArgs) -> Result<Ending> {
         let stop = stop_on_interrupt()?;
-        let task = Train { training: self, stop };
+        let task = Train {
+            training: self,
+            stop,
+        };
         backend::run(place.backend, place.device.as_deref(), task)?
     }
 }
@@ -46,7 +49,13 @@ impl Task for Train {
     type Output = Result<Ending>;
 
     fn run<B: TrainBackend>(self, device: B::Device) -> Self::Output {
-        let Training { recipe, pair, run, checkpoint, mut reporter } = self.training;
+        let Training {
+            recipe,
+            pair,
+            run,
+            checkpoint,
+            mut reporter,
+        } = self.training;
         let (normalisation, bounds) = (pair.normalisation, pair.bounds);
         let margin = recipe.training.box_margin as f32;
         let result = recipe.result.clone();
@@ -88,7 +97,9 @@ pub(super) fn write_and_show<B: ModelBackend>(
     stop: &AtomicBool,
     reporter: &mut Reporter,
 ) -> Result<Ending> {
-    reporter.handle(&Event::Extracting { frames: options.times.len() })?;
+    reporter.handle(&Event::Extracting {
+        frames: options.times.len(),
+    })?;
     let frames = write_frames(trained, options, |frame| {
         reporter.handle(&extracted(frame, options))?;
         Ok(!stop.load(Ordering::Relaxed))

@@ -93,7 +93,9 @@ pub fn draw(pair: &Pair, training: &TrainingRecipe, sizes: BatchSizes, step: usi
         pick(cloud, time, sizes.ends, &mut ends, rng);
         pick(cloud, time, sizes.carried, &mut starts, rng);
     }
-    let stops = (0..2 * sizes.carried).map(|_| time(training, rng)).collect();
+    let stops = (0..2 * sizes.carried)
+        .map(|_| time(training, rng))
+        .collect();
     let offsets = (0..sizes.band)
         .map(|_| {
             let width = training.band_widths[rng.random_range(0..training.band_widths.len())];
@@ -110,8 +112,17 @@ pub fn draw(pair: &Pair, training: &TrainingRecipe, sizes: BatchSizes, step: usi
         times: (0..sizes.uniform).map(|_| time(training, rng)).collect(),
     };
     let known = &pair.correspondences;
-    let matched = (0..sizes.matched).map(|_| known[rng.random_range(0..known.len())]).unzip();
-    Batch { ends, starts, stops, offsets, uniform, matched }
+    let matched = (0..sizes.matched)
+        .map(|_| known[rng.random_range(0..known.len())])
+        .unzip();
+    Batch {
+        ends,
+        starts,
+        stops,
+        offsets,
+        uniform,
+        matched,
+    }
 }
 
 fn pick(cloud: &Cloud, time: f32, count: usize, into: &mut Samples, rng: &mut impl Rng) {

@@ -69,7 +69,10 @@ pub struct FileDigest {
 
 impl FileDigest {
     fn of(content: &[u8]) -> Self {
-        Self { bytes: content.len() as u64, crc32: crc32fast::hash(content) }
+        Self {
+            bytes: content.len() as u64,
+            crc32: crc32fast::hash(content),
+        }
     }
 }
 
@@ -98,7 +101,9 @@ pub enum CheckpointError {
         problem: String,
     },
     /// Written by a later isomorph.
-    #[error("{path}: format version {found}, this isomorph reads {FORMAT_VERSION}: update isomorph")]
+    #[error(
+        "{path}: format version {found}, this isomorph reads {FORMAT_VERSION}: update isomorph"
+    )]
     Version {
         /// The file.
         path: PathBuf,
@@ -126,8 +131,10 @@ impl Checkpoint {
     /// [`CheckpointError`] if `state.json` is missing, damaged or too new.
     pub fn open(path: &Path) -> Result<Self, CheckpointError> {
         let file = path.join(STATE);
-        let text = fs::read_to_string(&file)
-            .map_err(|source| CheckpointError::Io { path: file.clone(), source })?;
+        let text = fs::read_to_string(&file).map_err(|source| CheckpointError::Io {
+            path: file.clone(),
+            source,
+        })?;
         let damaged = |error: serde_json::Error| CheckpointError::Damaged {
             path: file.clone(),
             problem: format!("not the JSON that was written ({error})"),
@@ -138,7 +145,10 @@ impl Checkpoint {
             return Err(CheckpointError::Version { path: file, found });
         }
         let state = serde_json::from_value(value).map_err(damaged)?;
-        Ok(Self { path: path.to_path_buf(), state })
+        Ok(Self {
+            path: path.to_path_buf(),
+            state,
+        })
     }
 
     /// The newest checkpoint in a folder of checkpoints.
@@ -157,7 +167,11 @@ impl Checkpoint {
     /// # Errors
     /// [`CheckpointError::Recipe`] if it no longer parses.
     pub fn recipe(&self) -> Result<Recipe, CheckpointError> {
-        Ok(Recipe::parse(&self.state.recipe, &self.path.join("recipe.toml"), &[])?)
+        Ok(Recipe::parse(
+            &self.state.recipe,
+            &self.path.join("recipe.toml"),
+            &[],
+        )?)
     }
 
     /// Reads one record, checked against its digest.
@@ -170,14 +184,22 @@ impl Checkpoint {
         device: &B::Device,
     ) -> Result<R, CheckpointError> {
         let path = self.path.join(part.file());
-        let content =
-            fs::read(&path).map_err(|source| CheckpointError::Io { path: path.clone(), source })?;
-        let damaged = |problem| CheckpointError::Damaged { path: path.clone(), problem };
+        let content = fs::read(&path).map_err(|source| CheckpointError::Io {
+            path: path.clone(),
+            source,
+        })?;
+        let damaged = |problem| CheckpointError::Damaged {
+            path: path.clone(),
+            problem,
+        };
         let found = FileDigest::of(&content);
         match self.state.files.get(part.file()) {
             None => return Err(damaged(format!("not named in {STATE}"))),
             Some(wanted) if wanted.bytes != found.bytes => {
-                return Err(damaged(format!("{} bytes, {} written", found.bytes, wanted.bytes)));
+                return Err(damaged(format!(
+                    "{} bytes, {} written",
+                    found.bytes, wanted.bytes
+                )));
             }
             Some(wanted) if *wanted != found => {
                 return Err(damaged("its checksum is not the one written".to_owned()));
@@ -219,7 +241,8 @@ impl Part {
 /// What burn's recorder says.
 pub fn encode<B: Backend>(record: impl Record<B>) -> io::Result<Vec<u8>> {
     let recorder = NamedMpkBytesRecorder::<FullPrecisionSettings>::default();
-    Recorder::<B>::record(&recorder, record, ()).map_err(|error| io::Error::other(error.to_string()))
+    Recorder::<B>::record(&recorder, record, ())
+        .map_err(|error| io::Error::other(error.to_string()))
 }
 
 /// Writes a checkpoint into `folder` and deletes all but the `keep` newest there; returns its path.
@@ -232,16 +255,23 @@ pub fn save(
     parts: Vec<(Part, Vec<u8>)>,
     keep: usize,
 ) -> Result<PathBuf, CheckpointError> {
-    state.files =
-        parts.iter().map(|(part, bytes)| (part.file().into(), FileDigest::of(bytes))).collect();
+    state.files = parts
+        .iter()
+        .map(|(part, bytes)| (part.file().into(), FileDigest::of(bytes)))
+        .collect();
     let path = folder.join(format!("step-{:06}", state.step));
     let written = || -> io::Result<()> {
         fs::create_dir_all(folder)?;
-        let temporary = tempfile::Builder::new().prefix(".step-").tempdir_in(folder)?;
+        let temporary = tempfile::Builder::new()
+            .prefix(".step-")
+            .tempdir_in(folder)?;
         for (part, bytes) in &parts {
             write_through(&temporary.path().join(part.file()), bytes)?;
         }
-        write_through(&temporary.path().join(STATE), &serde_json::to_vec_pretty(&state)?)?;
+        write_through(
+            &temporary.path().join(STATE),
+            &serde_json::to_vec_pretty(&state)?,
+        )?;
         flush_folder(temporary.path())?;
         if path.exists() {
             fs::remove_dir_all(&path)?;
@@ -251,11 +281,16 @@ pub fn save(
         let _ = temporary.keep();
         flush_folder(folder)
     };
-    written().map_err(|source| CheckpointError::Io { path: path.clone(), source })?;
+    written().map_err(|source| CheckpointError::Io {
+        path: path.clone(),
+        source,
+    })?;
     let all = list(folder);
     for (_, old) in &all[..all.len().saturating_sub(keep)] {
-        fs::remove_dir_all(old)
-            .map_err(|source| CheckpointError::Io { path: old.clone(), source })?;
+        fs::remove_dir_all(old).map_err(|source| CheckpointError::Io {
+            path: old.clone(),
+            source,
+        })?;
     }
     Ok(path)
 }
@@ -292,5 +327,9 @@ fn write_through(path: &Path, content: &[u8]) -> io::Result<()> {
 
 /// Makes the names in a folder as durable as the files; not every system can.
 fn flush_folder(path: &Path) -> io::Result<()> {
-    if cfg!(unix) { fs::File::open(path)?.sync_all() } else { Ok(()) }
+    if cfg!(unix) {
+        fs::File::open(path)?.sync_all()
+    } else {
+        Ok(())
+    }
 }

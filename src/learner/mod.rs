@@ -9,6 +9,7 @@
 //! | `optimiser.rs` | Adam with a limited gradient |
 //! | `checkpoint.rs` | whole checkpoints or none |
 //! | `event.rs` | what the loop reports |
+//! | `flop.rs` | what a step costs |
 //! | `memory.rs` | the process's peak memory |
 //!
 //! The learner prints nothing and knows no terminal: it emits [`Event`]s, which [`crate::report`] renders.
@@ -16,6 +17,7 @@
 pub mod batch;
 pub mod checkpoint;
 pub mod event;
+pub mod flop;
 pub mod memory;
 mod optimiser;
 pub mod schedule;
@@ -45,7 +47,9 @@ use step::Step;
 #[derive(Debug, thiserror::Error)]
 pub enum LearnerError {
     /// A term of the objective is not a number any more.
-    #[error("step {step}: the {term} term is {value}; {last}; try a smaller training.learning-rate")]
+    #[error(
+        "step {step}: the {term} term is {value}; {last}; try a smaller training.learning-rate"
+    )]
     NotFinite {
         /// The step, counted from 1.
         step: usize,
@@ -60,7 +64,9 @@ pub enum LearnerError {
     #[error("{0}")]
     OtherNetworks(String),
     /// The shapes are not those of the checkpoint.
-    #[error("{0}: the shapes are not those that this run was started with (their joint size or place differs); restore the files, or start a new run with `isomorph train`")]
+    #[error(
+        "{0}: the shapes are not those that this run was started with (their joint size or place differs); restore the files, or start a new run with `isomorph train`"
+    )]
     OtherShapes(PathBuf),
     /// A checkpoint could not be written or read.
     #[error(transparent)]
@@ -190,7 +196,10 @@ impl<B: TrainBackend> Learner<B> {
         while self.step < steps {
             if phase != Some(self.schedule.phase(self.step)) {
                 phase = Some(self.schedule.phase(self.step));
-                emit(Event::PhaseEntered { phase: self.schedule.phase(self.step), step: self.step })?;
+                emit(Event::PhaseEntered {
+                    phase: self.schedule.phase(self.step),
+                    step: self.step,
+                })?;
             }
             let due = self.checkpoint_is_due(self.step + 1);
             let logged = due || self.is_logged(self.step + 1);
@@ -215,7 +224,10 @@ impl<B: TrainBackend> Learner<B> {
         if !saved {
             self.save(checkpoints, emit)?;
         }
-        emit(Event::Finished { step: self.step, seconds: self.seconds })?;
+        emit(Event::Finished {
+            step: self.step,
+            seconds: self.seconds,
+        })?;
         Ok(Outcome::Finished)
     }
 
@@ -293,7 +305,12 @@ impl<B: TrainBackend> Learner<B> {
             Some((step, _)) => format!("last good checkpoint step-{step:06}"),
             None => "no checkpoint was written before".to_owned(),
         };
-        Err(LearnerError::NotFinite { step: self.step, term: term.name, value: term.raw, last })
+        Err(LearnerError::NotFinite {
+            step: self.step,
+            term: term.name,
+            value: term.raw,
+            last,
+        })
     }
 
     /// Writes a checkpoint of the present state.
@@ -304,8 +321,14 @@ impl<B: TrainBackend> Learner<B> {
     ) -> Result<(), LearnerError> {
         let encoded = || {
             Ok(vec![
-                (Part::Implicit, checkpoint::encode::<B>(self.implicit.clone().into_record())?),
-                (Part::Velocity, checkpoint::encode::<B>(self.velocity.clone().into_record())?),
+                (
+                    Part::Implicit,
+                    checkpoint::encode::<B>(self.implicit.clone().into_record())?,
+                ),
+                (
+                    Part::Velocity,
+                    checkpoint::encode::<B>(self.velocity.clone().into_record())?,
+                ),
                 (
                     Part::ImplicitOptimiser,
                     checkpoint::encode::<B>(self.implicit_optimiser.to_record())?,
@@ -319,7 +342,10 @@ impl<B: TrainBackend> Learner<B> {
         let parts = encoded().map_err(LearnerError::Record)?;
         let keep = self.recipe.checkpoint.keep;
         let path = checkpoint::save(checkpoints, self.state(), parts, keep)?;
-        emit(Event::Checkpoint { step: self.step, path })?;
+        emit(Event::Checkpoint {
+            step: self.step,
+            path,
+        })?;
         Ok(())
     }
 
@@ -360,7 +386,11 @@ impl<B: TrainBackend> Learner<B> {
 fn term_reports<B: Backend>(objective: &Objective<B>) -> Vec<TermReport> {
     let terms = objective.terms().iter().zip(objective.read());
     terms
-        .map(|(term, raw)| TermReport { name: term.name, raw, weighted: raw * term.weight })
+        .map(|(term, raw)| TermReport {
+            name: term.name,
+            raw,
+            weighted: raw * term.weight,
+        })
         .collect()
 }
 

@@ -29,11 +29,17 @@ pub fn advance<B: TrainBackend, M: AutodiffModule<B>>(
 ) -> M {
     let mut params = GradientsParams::from_module(gradients, &net);
     if clip > 0.0 {
-        let mut squares = Squares { gradients: &params, sum: None };
+        let mut squares = Squares {
+            gradients: &params,
+            sum: None,
+        };
         net.visit(&mut squares);
         if let Some(sum) = squares.sum {
             let factor = (sum.sqrt() + 1e-12).recip().mul_scalar(clip).clamp_max(1.0);
-            let mut scaled = Scaled { gradients: &mut params, factor };
+            let mut scaled = Scaled {
+                gradients: &mut params,
+                factor,
+            };
             net.visit(&mut scaled);
         }
     }
@@ -68,7 +74,8 @@ impl<B: AutodiffBackend> ModuleVisitor<B> for Scaled<'_, B> {
     fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<B, D>>) {
         if let Some(gradient) = self.gradients.remove::<B::InnerBackend, D>(param.id) {
             let factor = self.factor.clone().unsqueeze::<D>();
-            self.gradients.register::<B::InnerBackend, D>(param.id, gradient * factor);
+            self.gradients
+                .register::<B::InnerBackend, D>(param.id, gradient * factor);
         }
     }
 }

@@ -55,7 +55,12 @@ impl Schedule {
 
     /// The learning rate of the Velocity-Net.
     pub fn velocity_rate(&self, step: usize) -> f64 {
-        self.rate(self.training.velocity_learning_rate, step, 0, self.velocity_until)
+        self.rate(
+            self.training.velocity_learning_rate,
+            step,
+            0,
+            self.velocity_until,
+        )
     }
 
     /// A cosine falls over the network's own active span, `from .. until`; steps fall over the whole run
@@ -83,9 +88,8 @@ mod tests {
     use crate::recipe::{Preset, Recipe};
 
     fn schedule(preset: Preset) -> Schedule {
-        let text = format!(
-            "preset = \"{preset}\"\n[data]\nsource = \"a.ply\"\ntarget = \"b.ply\"\n"
-        );
+        let text =
+            format!("preset = \"{preset}\"\n[data]\nsource = \"a.ply\"\ntarget = \"b.ply\"\n");
         let recipe = Recipe::parse(&text, std::path::Path::new("recipe.toml"), &[]);
         Schedule::new(&recipe.expect("a small valid recipe").training)
     }
@@ -98,7 +102,10 @@ mod tests {
         assert_eq!(paper.phase(5000), Phase::Joint);
         assert_eq!(paper.phase(8000), Phase::ImplicitOnly);
         // Exact fractions of two: no rounding.
-        assert_eq!([1999, 3500, 5000, 9999].map(|step| paper.ramp(step)), [0.0, 0.5, 1.0, 1.0]);
+        assert_eq!(
+            [1999, 3500, 5000, 9999].map(|step| paper.ramp(step)),
+            [0.0, 0.5, 1.0, 1.0]
+        );
         let rates = [0, 1999, 2000, 9999].map(|step| paper.implicit_rate(step));
         assert_eq!(rates, [5e-3, 5e-3, 2.5e-3, 5e-3 / 16.0]);
     }

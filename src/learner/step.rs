@@ -70,7 +70,12 @@ impl<B: TrainBackend> Step<'_, B> {
     fn carry(&self, batch: &Batch, objective: &mut Objective<B>) -> Carried<B> {
         let times = column::<B>(&batch.stops, self.device);
         let (still, normals) = self.carry_constants(batch);
-        let carried = |positions| Carried { positions, still: still.clone(), normals, times };
+        let carried = |positions| Carried {
+            positions,
+            still: still.clone(),
+            normals,
+            times,
+        };
         if self.phase == Phase::ImplicitOnly {
             return carried(Tensor::from_inner(still.clone()));
         }
@@ -89,13 +94,26 @@ impl<B: TrainBackend> Step<'_, B> {
             return carried(Tensor::from_inner(still.clone()));
         }
         let rows = x.len();
-        let (x, from, to) =
-            (self.rows(&x), column(&from, self.device), column(&to, self.device));
+        let (x, from, to) = (
+            self.rows(&x),
+            column(&from, self.device),
+            column(&to, self.device),
+        );
         let rhs = |x, t| self.v.forward(x, t);
-        let arrived =
-            integrate(rhs, x, from, to, self.settings.steps, self.settings.integrator);
+        let arrived = integrate(
+            rhs,
+            x,
+            from,
+            to,
+            self.settings.steps,
+            self.settings.integrator,
+        );
         let loss = &self.settings.loss;
-        let weight = if joint { loss.matching } else { loss.matching_warm_up };
+        let weight = if joint {
+            loss.matching
+        } else {
+            loss.matching_warm_up
+        };
         if matched > 0 {
             objective.add("matching", weight, || {
                 let marks = self.rows(&[&targets[..], sources].concat());
@@ -111,10 +129,7 @@ impl<B: TrainBackend> Step<'_, B> {
     }
 
     /// The same trajectories without a graph, with the normals where they are wanted.
-    fn carry_constants(
-        &self,
-        batch: &Batch,
-    ) -> (Tensor<B::InnerBackend, 2>, Option<Tensor<B, 2>>) {
+    fn carry_constants(&self, batch: &Batch) -> (Tensor<B::InnerBackend, 2>, Option<Tensor<B, 2>>) {
         let settings = self.settings;
         let v = self.v.valid();
         let x = rows::<B::InnerBackend>(&batch.starts.points, self.device);
@@ -163,7 +178,12 @@ impl<B: TrainBackend> Step<'_, B> {
     ) -> Option<VelocityJet<B>> {
         let loss = &self.settings.loss;
         let trained = self.phase != Phase::ImplicitOnly;
-        let for_v = [loss.smoothness, loss.divergence, loss.strain, loss.steadiness];
+        let for_v = [
+            loss.smoothness,
+            loss.divergence,
+            loss.strain,
+            loss.steadiness,
+        ];
         let for_f = self.phase != Phase::WarmUp && loss.level_set > 0.0;
         let wanted = for_f || (trained && for_v.iter().any(|weight| *weight > 0.0));
         if !wanted {
@@ -173,21 +193,35 @@ impl<B: TrainBackend> Step<'_, B> {
             let still = self.v.valid();
             let request = VelocityRequest::default();
             let (x, t) = (x.inner(), t.inner());
-            let jet = self.settings.derivatives.velocity_jet(&still, x, t, request);
+            let jet = self
+                .settings
+                .derivatives
+                .velocity_jet(&still, x, t, request);
             return Some(constant(jet));
         }
         let request = VelocityRequest {
             laplacian: loss.smoothness > 0.0 && loss.smoothness_alpha > 0.0,
             rate: loss.steadiness > 0.0,
         };
-        let jet = self.settings.derivatives.velocity_jet(self.v, x, t, request);
+        let jet = self
+            .settings
+            .derivatives
+            .velocity_jet(self.v, x, t, request);
         let (alpha, gamma) = (loss.smoothness_alpha, loss.smoothness_gamma);
-        objective.add("smoothness", loss.smoothness, || smoothness::smoothness(&jet, alpha, gamma));
-        objective.add("divergence", loss.divergence, || divergence::divergence(&jet));
+        objective.add("smoothness", loss.smoothness, || {
+            smoothness::smoothness(&jet, alpha, gamma)
+        });
+        objective.add("divergence", loss.divergence, || {
+            divergence::divergence(&jet)
+        });
         if self.sizes.band > 0 {
-            objective.add("strain", loss.strain, || strain::strain(&jet.first(self.sizes.band)));
+            objective.add("strain", loss.strain, || {
+                strain::strain(&jet.first(self.sizes.band))
+            });
         }
-        objective.add("steadiness", loss.steadiness, || steadiness::steadiness(&jet));
+        objective.add("steadiness", loss.steadiness, || {
+            steadiness::steadiness(&jet)
+        });
         Some(jet)
     }
 
@@ -204,7 +238,11 @@ impl<B: TrainBackend> Step<'_, B> {
         let ends = batch.ends.points.len();
         let collocation = x.dims()[0];
         let all_x = vec![self.rows(&batch.ends.points), x, carried.positions.clone()];
-        let all_t = vec![column(&batch.ends.times, self.device), t, carried.times.clone()];
+        let all_t = vec![
+            column(&batch.ends.times, self.device),
+            t,
+            carried.times.clone(),
+        ];
         let (all_x, all_t) = (Tensor::cat(all_x, 0), Tensor::cat(all_t, 0));
         let jet = self.settings.derivatives.implicit_jet(self.f, all_x, all_t);
         let total = jet.value.dims()[0];
@@ -213,7 +251,9 @@ impl<B: TrainBackend> Step<'_, B> {
         let at_carried = jet.rows(ends + collocation, total);
 
         // The paper adds the means over the two shapes, which have equal shares: twice the mean of both.
-        objective.add("data", loss.data, || data::data(at_ends.value.clone()) * 2.0);
+        objective.add("data", loss.data, || {
+            data::data(at_ends.value.clone()) * 2.0
+        });
         if batch.ends.normals.len() == ends {
             objective.add("normals", loss.normals, || {
                 normals::normals(&at_ends, self.rows(&batch.ends.normals))

@@ -96,7 +96,7 @@ sections! {
         skip: usize = 0 | 0 | 0, Rule::whole(0, 31).zero("gives it to none");
         /// Whether V depends on the time as well; the paper writes V(x); without time, rotations
         /// are exact and the motion in between is steadier.
-        time_dependent: bool = false | false | true, Rule::flag();
+        time_dependent: bool = false | false | false, Rule::flag();
     }
 
     /// The weights of the objective's terms and what shapes them.
@@ -145,10 +145,10 @@ sections! {
         eikonal: f64 = 10 | 10 | 10, Rule::positive_or_zero().zero("lets f collapse");
         /// Weight of |f| at surface points carried to random times; not in the paper; teaches V
         /// as well.
-        on_surface: f64 = 100 | 100 | 100, Rule::positive_or_zero().zero("turns it off");
+        on_surface: f64 = 100 | 100 | 0, Rule::positive_or_zero().zero("turns it off");
         /// Weight of the angle between grad f and the normals carried by V; not in the paper; the
         /// decisive term for the surfaces in between.
-        transported_normals: f64 = 20 | 20 | 20, Rule::positive_or_zero().zero("turns it off");
+        transported_normals: f64 = 20 | 20 | 0, Rule::positive_or_zero().zero("turns it off");
         /// Weight of exp(-100 |f|) away from the surface; not in the paper; for shapes without
         /// normals, where 30 is a good start.
         off_surface: f64 = 0 | 0 | 0, Rule::positive_or_zero().zero("turns it off");
@@ -160,7 +160,7 @@ sections! {
     /// The steps of the optimiser and what each one samples.
     training: TrainingRecipe {
         /// Steps of the optimiser; the paper takes 10000.
-        steps: usize = 1_000 | 8_000 | 10_000, Rule::whole(1, MANY);
+        steps: usize = 1_000 | 6_000 | 10_000, Rule::whole(1, MANY);
         /// Points at which f is evaluated in each step; the paper takes 4000.
         batch: usize = 2_200 | 4_000 | 4_000, Rule::whole(64, 1_000_000);
         /// Correspondences carried in each step, all of them where fewer are known; the paper
@@ -197,7 +197,7 @@ sections! {
         times: TimeSampling = "random" | "random" | "random", Rule::word(TimeSampling::WORDS);
         /// Derivatives by "nested" automatic differentiation or by one "forward" sweep: the same
         /// numbers at different cost.
-        derivatives: Derivatives = "nested" | "nested" | "nested", Rule::word(Derivatives::WORDS);
+        derivatives: Derivatives = "nested" | "nested" | "forward", Rule::word(Derivatives::WORDS);
         /// Share of the collocation points that lie near the surface; the others fill the box; the
         /// paper leaves it open.
         band_share: f64 = 0.75 | 0.75 | 0.75,

@@ -22,7 +22,7 @@ const NAMED_TERMS: usize = 3;
 pub(super) fn line(event: &Event, run: &Path, left: Option<Duration>) -> Option<String> {
     Some(match event {
         Event::Tick { .. } => return None,
-        Event::Started { .. } => started(event),
+        Event::Started { .. } => return started(event),
         Event::Note(text) => format!("note: {}", text.replace('\n', " ")),
         Event::PhaseEntered { phase, step } => format!("{phase} from step {} on", step + 1),
         Event::Step(report) => step(report, left),
@@ -30,7 +30,7 @@ pub(super) fn line(event: &Event, run: &Path, left: Option<Duration>) -> Option<
             format!("checkpoint after step {step}: {}", path.display())
         }
         Event::Extracting { frames } => format!("extracting {}", counted(*frames, "surface")),
-        Event::Extracted { .. } => extracted(event),
+        Event::Extracted { .. } => return extracted(event),
         Event::Interrupted { step } => format!(
             "interrupted after step {step}; go on with `isomorph resume {}`",
             run.display()
@@ -80,7 +80,8 @@ pub(super) fn duration(seconds: f64) -> String {
     }
 }
 
-fn started(event: &Event) -> String {
+/// What is trained on what; `None` for any other event than the start.
+fn started(event: &Event) -> Option<String> {
     let Event::Started {
         backend,
         device,
@@ -93,20 +94,20 @@ fn started(event: &Event) -> String {
         correspondences,
     } = event
     else {
-        return String::new();
+        return None;
     };
     let begun = match first_step {
         0 => format!("{} on", counted(*steps, "step")),
         _ => format!("going on after step {first_step} of {steps} on"),
     };
-    format!(
+    Some(format!(
         "{begun} {backend} ({device}): f has {}, V has {}; {} on the source, {} on the target, {}",
         counted(*implicit_parameters, "weight"),
         HumanCount(*velocity_parameters as u64),
         counted(*source_points, "point"),
         HumanCount(*target_points as u64),
         counted(*correspondences, "correspondence"),
-    )
+    ))
 }
 
 fn step(report: &StepReport, left: Option<Duration>) -> String {
@@ -126,7 +127,8 @@ fn step(report: &StepReport, left: Option<Duration>) -> String {
     format!("{text}: {}", objective(report))
 }
 
-fn extracted(event: &Event) -> String {
+/// A surface and what is wrong with it; `None` for any other event than an extraction.
+fn extracted(event: &Event) -> Option<String> {
     let Event::Extracted {
         time,
         path,
@@ -136,7 +138,7 @@ fn extracted(event: &Event) -> String {
         touches_box,
     } = event
     else {
-        return String::new();
+        return None;
     };
     let mut text = format!(
         "time {time:.3}: {}, {}, {}: {}",
@@ -151,7 +153,7 @@ fn extracted(event: &Event) -> String {
     if *touches_box {
         text += "; the box cuts it off: train with a larger training.box-margin";
     }
-    text
+    Some(text)
 }
 
 /// A number of things: `1 surface`, `20,000 points`, `8 vertices`.

@@ -117,32 +117,55 @@ mod tests {
 
     #[test]
     fn a_step_looks_like_this() {
-        let tick = |seconds, step| (seconds, Event::Tick { step });
+        let started = Event::Started {
+            backend: "ndarray".into(),
+            device: "Cpu".into(),
+            steps: 400,
+            first_step: 99,
+            implicit_parameters: 2,
+            velocity_parameters: 2,
+            source_points: 2,
+            target_points: 2,
+            correspondences: 0,
+        };
         let entered = Event::PhaseEntered {
             phase: Phase::Ramp,
             step: 99,
         };
-        let text = written(&[(0.0, entered), tick(0.5, 100), (0.5, report(100, 1.5))]);
+        let tick = Event::Tick { step: 100 };
+        let text = written(&[
+            (0.0, started),
+            (0.0, entered),
+            (0.5, tick),
+            (0.5, report(100, 1.5)),
+        ]);
         assert_eq!(
             text,
-            "ramp from step 100 on\n\
-             step 100 of 400, ramp, 1m40s, 0.0s left, peak 300 MiB: total 1.50 (matching 1.50)\n",
-            "without `Started` the run has no steps left"
+            "going on after step 99 of 400 on ndarray (Cpu): f has 2 weights, V has 2; 2 points on \
+             the source, 2 on the target, 0 correspondences\n\
+             ramp from step 100 on\n\
+             step 100 of 400, ramp, 1m40s, 2m30s left, peak 300 MiB: total 1.50 (matching 1.50)\n",
+            "300 steps of half a second are left"
         );
     }
 
     #[test]
     fn a_reader_that_went_away_does_not_stop_the_run() {
-        struct Closed;
+        /// Counts what it refuses.
+        struct Closed(usize);
         impl Write for Closed {
             fn write(&mut self, _: &[u8]) -> std::io::Result<usize> {
+                self.0 += 1;
                 Err(std::io::ErrorKind::BrokenPipe.into())
             }
             fn flush(&mut self) -> std::io::Result<()> {
                 Ok(())
             }
         }
-        let mut lines = PlainLines::new(Closed, PathBuf::new());
-        lines.show(&Event::Note("anyone there?".into()), Instant::now());
+        let mut lines = PlainLines::new(Closed(0), PathBuf::new());
+        for _ in 0..2 {
+            lines.show(&Event::Note("anyone there?".into()), Instant::now());
+        }
+        assert_eq!(lines.out.0, 2, "refused twice, and no panic");
     }
 }

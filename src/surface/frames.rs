@@ -2,7 +2,7 @@
 //! `grad f`, and the input mesh's own vertices carried along `V`.
 //!
 //! Everything is written in the user's coordinates. `frames.json` lists the files:
-//! `[{"time": t, "surface": "surface-000.ply", "carried": "carried-000.ply"}, …]`.
+//! `[{"time": t, "surface": "surface-000.ply", "slope_error": 0.02, "carried": "carried-000.ply"}, …]`.
 
 use std::convert::Infallible;
 use std::io;
@@ -67,6 +67,9 @@ pub struct FrameEntry {
     pub time: f64,
     /// The surface's file, relative to `frames.json`.
     pub surface: String,
+    /// The mean of `||grad f| - 1|` over the surface's vertices: how far f is from a distance there.
+    #[serde(default)]
+    pub slope_error: f64,
     /// The carried mesh's file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub carried: Option<String>,
@@ -138,7 +141,7 @@ pub fn write_frames<B: ModelBackend>(
         } else {
             mesh
         };
-        let normals = normals(trained, &mesh.vertices, time);
+        let (normals, slope_error) = normals(trained, &mesh.vertices, time);
         let in_users: Vec<[f64; 3]> = mesh
             .vertices
             .iter()
@@ -154,6 +157,7 @@ pub fn write_frames<B: ModelBackend>(
         let entry = FrameEntry {
             time,
             surface,
+            slope_error,
             carried,
         };
         let frame = Frame {
@@ -195,16 +199,25 @@ fn surface_at<B: ModelBackend>(
     Ok((found.mesh, found.touches_box, share))
 }
 
-/// Unit normals `grad f / |grad f|` at points of the surface.
-fn normals<B: ModelBackend>(trained: &Trained<B>, points: &[[f32; 3]], time: f64) -> Vec<[f32; 3]> {
+/// Unit normals `grad f / |grad f|` at points of the surface, and the mean of `||grad f| - 1|` there.
+fn normals<B: ModelBackend>(
+    trained: &Trained<B>,
+    points: &[[f32; 3]],
+    time: f64,
+) -> (Vec<[f32; 3]>, f64) {
     let flat = in_chunks(points, &trained.device, |x| {
         let t = Tensor::full([x.dims()[0], 1], time, &trained.device);
         // The written-out reverse sweep: on a backend without autodiff it is the only way, and exact.
-        Derivatives::Forward
-            .implicit_jet(&trained.implicit, x, t)
-            .normal()
+        let jet = Derivatives::Forward.implicit_jet(&trained.implicit, x, t);
+        Tensor::cat(vec![jet.normal(), jet.slope()], 1)
     });
-    flat.as_chunks::<3>().0.to_vec()
+    let rows = flat.as_chunks::<4>().0;
+    let off: f64 = rows
+        .iter()
+        .map(|[_, _, _, slope]| (f64::from(*slope) - 1.0).abs())
+        .sum();
+    let normals = rows.iter().map(|[x, y, z, _]| [*x, *y, *z]).collect();
+    (normals, off / rows.len().max(1) as f64)
 }
 
 /// Carries the vertices of a shape through all times and writes a file for each; their names.
