@@ -83,7 +83,7 @@ impl Size {
 }
 
 #[derive(Debug, Serialize)]
-struct Measured {
+pub(super) struct Measured {
     backend: String,
     size: String,
     derivatives: &'static str,
@@ -93,13 +93,13 @@ struct Measured {
 }
 
 #[derive(Debug, Serialize)]
-struct Phases {
+pub(super) struct Phases {
     warm_up: PhaseCost,
     joint: PhaseCost,
 }
 
 #[derive(Debug, Serialize)]
-struct PhaseCost {
+pub(super) struct PhaseCost {
     seconds_per_step: f64,
     first_step_seconds: f64,
     gflop_per_step: f64,
