@@ -38,7 +38,9 @@ fn softplus_chunk(z: &[f32], beta: f32, value: &mut [f32], slope: &mut [f32]) {
     for ((z, value), slope) in z.iter().zip(value).zip(slope) {
         let e = exp_of_negative(-(beta * z).abs());
         let s = e / (2.0 + e);
-        *value = z.max(0.0) + width * twice_atanh(s);
+        // Not `max`, which would turn NaN into 0.
+        let right = if *z < 0.0 { 0.0 } else { *z };
+        *value = right + width * twice_atanh(s);
         *slope = (if *z >= 0.0 { 1.0 } else { e }) / (1.0 + e);
     }
 }
@@ -52,7 +54,7 @@ fn exp_of_negative(x: f32) -> f32 {
     /// ln 2 in two parts, the first with few digits, so that `n * HIGH` is exact.
     const HIGH: f32 = 0.693_359_4;
     const LOW: f32 = -2.121_944_4e-4;
-    let clamped = x.max(-87.0);
+    let clamped = if x < -87.0 { -87.0 } else { x };
     let shifted = clamped * LOG2_E + ROUND;
     let n = shifted - ROUND;
     let r = clamped - n * HIGH - n * LOW;

@@ -1,10 +1,11 @@
 //! Wavefront OBJ: `v` lines as vertices, `f` lines as polygons; groups, materials and texture
 //! coordinates are passed over, so a file of many groups is one shape.
 //!
-//! The lines are read here and not by the tobj crate, because that numbers vertices anew by their
-//! first use in each group and drops those that no face uses, while correspondences and the
-//! carried mesh need the file's own order. It also names no line in its errors, and refuses weights,
-//! comments and partial colours after coordinates. The tests hold this reader to tobj's geometry.
+//! The coordinates and normals are read here, line by line: tobj numbers vertices anew by their first
+//! use in each group and drops those that no face uses, while correspondences and the carried mesh need
+//! the file's own order; it also names no line in its errors, and refuses weights, comments and partial
+//! colours after coordinates. The polygons are tobj's to triangulate: each vertex goes in with its number
+//! as its position, so that the triangles come back in the file's own numbers.
 
 use std::path::Path;
 
@@ -100,16 +101,19 @@ pub(super) fn read(path: &Path) -> Result<Shape, ShapeError> {
             base,
         });
     }
-    let normals = if polygons.triangles.is_empty() {
+    let triangles = polygons
+        .triangulated(vertices.len())
+        .map_err(|error| ShapeError::malformed(path, format!("its faces: {error}")))?;
+    let normals = if triangles.is_empty() {
         // Without faces nothing else says which vertex a normal belongs to.
         (vertex_normals.len() == vertices.len()).then_some(vertex_normals)
     } else {
-        polygons.normals_of_vertices(&vertex_normals, vertices.len())
+        polygons.normals_of_vertices(&vertex_normals, &triangles, vertices.len())
     };
     Ok(Shape {
         path: path.to_owned(),
         vertices,
-        triangles: polygons.triangles,
+        triangles,
         normals,
     })
 }
@@ -160,7 +164,8 @@ fn parse_index(part: &str, count: usize, word: &str) -> Result<u32, String> {
 /// What the `f` lines say.
 #[derive(Default)]
 struct Polygons {
-    triangles: Vec<[u32; 3]>,
+    /// The faces again, with all corners counted from 1: what tobj triangulates.
+    text: String,
     /// `[face, vertex]` with the greatest vertex.
     greatest: Option<(usize, u32)>,
     faces: usize,
@@ -183,9 +188,36 @@ impl Polygons {
                 .extend(corner.normal.map(|normal| (corner.vertex, normal)));
             corners.push(corner.vertex);
         }
-        super::push_fan(&mut self.triangles, &corners);
+        if corners.len() >= 3 {
+            self.text.push('f');
+            for vertex in corners {
+                self.text.push_str(&format!(" {}", u64::from(vertex) + 1));
+            }
+            self.text.push('\n');
+        }
         self.faces += 1;
         Ok(())
+    }
+
+    /// The polygons as triangles of the file's own vertex numbers.
+    fn triangulated(&self, vertices: usize) -> Result<Vec<[u32; 3]>, tobj::LoadError> {
+        if self.text.is_empty() {
+            return Ok(Vec::new());
+        }
+        let mut numbered: String = (0..vertices).map(|k| format!("v {k} 0 0\n")).collect();
+        numbered.push_str(&self.text);
+        let options = tobj::LoadOptions {
+            triangulate: true,
+            ..Default::default()
+        };
+        let no_materials = |_: &Path| Err(tobj::LoadError::OpenFileFailed);
+        let (models, _) = tobj::load_obj_buf(&mut numbered.as_bytes(), &options, no_materials)?;
+        let triangles = models.iter().flat_map(|model| {
+            let number = |k: &u32| model.mesh.positions[3 * *k as usize] as u32;
+            let corners = model.mesh.indices.as_chunks::<3>().0.iter();
+            corners.map(move |corners| corners.each_ref().map(number))
+        });
+        Ok(triangles.collect())
     }
 
     /// The face and vertex, if any, beyond this count: known only once all `v` lines are read.
@@ -195,7 +227,12 @@ impl Polygons {
     }
 
     /// One normal per vertex, if every vertex in a face has exactly one.
-    fn normals_of_vertices(&self, list: &[[f32; 3]], vertices: usize) -> Option<Vec<[f32; 3]>> {
+    fn normals_of_vertices(
+        &self,
+        list: &[[f32; 3]],
+        triangles: &[[u32; 3]],
+        vertices: usize,
+    ) -> Option<Vec<[f32; 3]>> {
         let mut found = vec![None; vertices];
         for &(vertex, normal) in &self.normals {
             let normal = list.get(normal as usize)?;
@@ -206,7 +243,7 @@ impl Polygons {
                 return None;
             }
         }
-        let used = self.triangles.iter().flatten();
+        let used = triangles.iter().flatten();
         if used
             .into_iter()
             .any(|&vertex| found[vertex as usize].is_none())

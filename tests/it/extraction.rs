@@ -1,0 +1,152 @@
+//! `extract`: surfaces in another format and place, and the input's own vertices carried along.
+
+use std::fs;
+
+use crate::support::mesh::Mesh;
+use crate::support::ply::{self, Ply};
+use crate::support::run::frames;
+use crate::support::workplace::{Workplace, turn};
+
+/// A few steps: what is extracted is then near the sphere that f starts from, and a surface like any other.
+const KEYS: &[&str] = &[
+    "training.steps = 10",
+    "training.log-every = 4",
+    "checkpoint.every = 5",
+];
+
+#[test]
+fn extraction_writes_obj_where_it_is_told_to() {
+    let _turn = turn();
+    let place = Workplace::tiny(KEYS);
+    let run = place.train("run", &[]);
+    let extract = [
+        "extract",
+        "run",
+        "--quiet",
+        "--times",
+        "1,0",
+        "--resolution",
+        "32",
+    ];
+    place
+        .isomorph(&[&extract[..], &["--format", "obj", "-o", "deep/out"]].concat())
+        .succeeded();
+    assert!(!run.path("meshes").exists(), "the run is left alone");
+    let frames = frames(&place.path("deep/out"));
+    assert_eq!(
+        frames.iter().map(|frame| frame.time).collect::<Vec<_>>(),
+        [1.0, 0.0]
+    );
+    place
+        .isomorph(&[&extract[..], &["-o", "ply"]].concat())
+        .succeeded();
+    for (k, frame) in frames.iter().enumerate() {
+        let text = fs::read_to_string(&frame.surface).expect("an OBJ file");
+        let count = |kind: &str| text.lines().filter(|line| line.starts_with(kind)).count();
+        let same = Ply::read(&place.path(&format!("ply/surface-00{k}.ply"))).mesh();
+        assert_eq!(
+            (count("v "), count("f ")),
+            (same.vertices.len(), same.triangles.len())
+        );
+        assert_eq!(count("vn "), count("v "));
+    }
+}
+
+/// Rows of a PLY with colours: position, texture coordinate, colour.
+fn coloured_rows(mesh: &Mesh) -> Vec<String> {
+    let row = |(k, x): (usize, &[f64; 3])| {
+        format!(
+            "{} {} 0.25 {} {} 7",
+            ply::words(*x),
+            k as f64 / 1024.0,
+            k % 256,
+            k / 256
+        )
+    };
+    mesh.vertices.iter().enumerate().map(row).collect()
+}
+
+#[test]
+fn a_carried_mesh_keeps_faces_order_colours_and_texture_coordinates() {
+    let _turn = turn();
+    let place = Workplace::tiny(KEYS);
+    let sphere = Mesh::sphere(1.0, 3);
+    let properties = ["double x", "double y", "double z", "float s", "float t"];
+    let colours = ["uchar red", "uchar green", "uchar blue"];
+    let properties = [&properties[..], &colours].concat();
+    let text = ply::text_of(&properties, &coloured_rows(&sphere), &sphere.triangles);
+    place.write("source.ply", &text);
+    place.train("run", &[]);
+    let extract = [
+        "extract",
+        "run",
+        "--quiet",
+        "--times",
+        "0,1",
+        "--resolution",
+        "32",
+    ];
+    place
+        .isomorph(&[&extract[..], &["--carry", "-o", "out"]].concat())
+        .succeeded();
+    let given = Ply::read(&place.path("source.ply"));
+    let carried = frames(&place.path("out")).into_iter();
+    let carried: Vec<Ply> = carried
+        .map(|frame| Ply::read(&frame.carried.expect("--carry was given")))
+        .collect();
+    for file in &carried {
+        assert_eq!(file.properties, given.properties);
+        assert_eq!(file.triangles, given.triangles);
+        for name in ["s", "t", "red", "green", "blue"] {
+            assert_eq!(file.column(name), given.column(name), "{name}");
+        }
+    }
+    assert_eq!(carried[0].rows, given.rows, "time 0 is the input itself");
+    assert_ne!(carried[1].column("x"), given.column("x"), "time 1 is not");
+}
+
+#[test]
+fn a_carried_obj_keeps_every_line_but_those_of_its_vertices() {
+    let _turn = turn();
+    let place = Workplace::tiny(KEYS);
+    let sphere = Mesh::sphere(1.0, 3);
+    let mut text = String::from("# by hand\nmtllib skin.mtl\no ball\n");
+    for x in &sphere.vertices {
+        text.push_str(&format!(
+            "v {}\nvt {} {}\n",
+            ply::words(*x),
+            x[0].abs(),
+            x[1].abs()
+        ));
+    }
+    text.push_str("usemtl skin\n");
+    for triangle in &sphere.triangles {
+        let [a, b, c] = triangle.map(|index| index + 1);
+        text.push_str(&format!("f {a}/{a} {b}/{b} {c}/{c}\n"));
+    }
+    place.write("source.obj", &text);
+    place.train("run", &["--set", "data.source=source.obj"]);
+    let extract = [
+        "extract",
+        "run",
+        "--quiet",
+        "--times",
+        "1",
+        "--resolution",
+        "32",
+    ];
+    place
+        .isomorph(&[&extract[..], &["--carry", "-o", "out"]].concat())
+        .succeeded();
+    let carried = fs::read_to_string(place.path("out/carried-000.obj")).expect("a carried mesh");
+    let moved = carried.lines().zip(text.lines()).filter(|(found, given)| {
+        let both = found.starts_with("v ") && given.starts_with("v ");
+        assert!(both || found == given, "{found:?} instead of {given:?}");
+        both && found != given
+    });
+    assert!(
+        moved.count() > sphere.vertices.len() / 2,
+        "hardly a vertex moves"
+    );
+    assert_eq!(carried.lines().count(), text.lines().count());
+}

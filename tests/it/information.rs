@@ -1,0 +1,162 @@
+//! `info` on every kind of thing, and the help texts.
+
+use crate::support::mesh::Mesh;
+use crate::support::ply;
+use crate::support::workplace::{Workplace, turn};
+
+/// The word or words after a label at the start of a line.
+#[track_caller]
+fn field<'a>(text: &'a str, label: &str) -> &'a str {
+    let line = text
+        .lines()
+        .find(|line| line.split(' ').next() == Some(label));
+    line.unwrap_or_else(|| panic!("no {label:?} in {text}"))[label.len()..].trim()
+}
+
+#[test]
+fn info_measures_a_mesh() {
+    let place = Workplace::new();
+    let bar = Mesh::bar([1.0, 0.25, 0.5], 0.125);
+    place.write("bar.ply", ply::text(&bar));
+    let text = place.isomorph(&["info", "bar.ply"]).succeeded().stdout;
+    assert!(text.starts_with("bar.ply: mesh\n"), "{text}");
+    assert_eq!(field(&text, "vertices"), bar.vertices.len().to_string());
+    assert_eq!(field(&text, "triangles"), bar.triangles.len().to_string());
+    // Exact: 2 (1/4 + 1/2 + 1/8) and 1/8, and the same with more digits.
+    assert_eq!(
+        (field(&text, "area"), field(&text, "volume")),
+        ("1.750000", "0.125000")
+    );
+    assert_eq!(field(&text, "closed"), "yes");
+    let open = Mesh {
+        triangles: bar.triangles[1..].to_vec(),
+        ..bar
+    };
+    place.write("open.ply", ply::text(&open));
+    let text = place.isomorph(&["info", "open.ply"]).succeeded().stdout;
+    assert_eq!(field(&text, "closed"), "no");
+}
+
+#[test]
+fn info_reads_an_obj_of_quadrilaterals_and_a_cloud() {
+    let place = Workplace::new();
+    place.write(
+        "square.obj",
+        "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nf 1 2 3 4\n",
+    );
+    let text = place.isomorph(&["info", "square.obj"]).succeeded().stdout;
+    assert_eq!(
+        (field(&text, "triangles"), field(&text, "area")),
+        ("2", "4.000000")
+    );
+    place.write("cloud.ply", ply::cloud(&Mesh::sphere(1.0, 5).vertices));
+    let text = place.isomorph(&["info", "cloud.ply"]).succeeded().stdout;
+    assert!(text.starts_with("cloud.ply: point cloud\n"), "{text}");
+    let area = field(&text, "area").split(' ').next().expect("a number");
+    let area: f64 = area.parse().expect("a number");
+    // Estimated from the density: a tenth is what an estimate may be off.
+    let exact = 4.0 * std::f64::consts::PI;
+    assert!(
+        (area / exact - 1.0).abs() < 0.1,
+        "{area} instead of {exact}"
+    );
+}
+
+#[test]
+fn info_counts_the_frames_of_a_sequence() {
+    let place = Workplace::new();
+    // Three frames of a tetrahedron, in DeformingThings4D's layout.
+    let mut bytes = Vec::new();
+    for count in [3, 4, 4_i32] {
+        bytes.extend(count.to_le_bytes());
+    }
+    let corners = [
+        [0.0, 0.0, 0.0],
+        [1.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [0.0, 0.0, 1.0_f32],
+    ];
+    bytes.extend(corners.iter().flatten().flat_map(|part| part.to_le_bytes()));
+    let faces = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2_i32]];
+    bytes.extend(faces.iter().flatten().flat_map(|index| index.to_le_bytes()));
+    bytes.extend(
+        [0.5_f32; 2 * 4 * 3]
+            .iter()
+            .flat_map(|part| part.to_le_bytes()),
+    );
+    place.write("walk.anime", &bytes);
+    let text = place.isomorph(&["info", "walk.anime"]).succeeded().stdout;
+    assert!(text.contains("3 frames, 4 vertices, 4 triangles"), "{text}");
+    place.write("torn.anime", &bytes[..bytes.len() - 1]);
+    place
+        .isomorph(&["info", "torn.anime"])
+        .refused(1, &["torn.anime: "]);
+}
+
+#[test]
+fn info_says_where_a_run_stands() {
+    let _turn = turn();
+    let place = Workplace::tiny(&["training.steps = 4", "checkpoint.every = 2"]);
+    place.train("run", &["--backend", "ndarray"]);
+    let text = place.isomorph(&["info", "run"]).succeeded().stdout;
+    assert!(text.starts_with("run: run\n"), "{text}");
+    assert_eq!(field(&text, "checkpoints"), "at steps 2, 4");
+    assert_eq!(field(&text, "steps"), "4 of 4");
+    assert!(field(&text, "backend").contains("ndarray"), "{text}");
+    assert!(field(&text, "f").starts_with("3 x 32"), "{text}");
+    assert!(field(&text, "source").ends_with("source.ply"), "{text}");
+}
+
+#[test]
+fn every_command_has_help_that_names_its_defaults() {
+    let place = Workplace::new();
+    let cases: &[(&str, &[&str])] = &[
+        (
+            "train",
+            &["--force", "--set", "section.key=value", "[default: runs/"],
+        ),
+        (
+            "resume",
+            &["newest checkpoint", "--set", "section.key=value"],
+        ),
+        (
+            "extract",
+            &[
+                "[default: 9]",
+                "[default: ply]",
+                "[default: meshes/",
+                "[default: as in",
+            ],
+        ),
+        ("init", &["[default: none]", "[default: default]"]),
+        ("info", &["recipe", "run"]),
+        ("bench", &["--json"]),
+    ];
+    let overview = place.isomorph(&["--help"]).succeeded().stdout;
+    for (command, parts) in cases {
+        assert!(
+            overview.contains(&format!("\n  {command} ")),
+            "no {command} in {overview}"
+        );
+        let help = place.isomorph(&[command, "--help"]).succeeded().stdout;
+        for part in *parts {
+            assert!(
+                help.to_lowercase().contains(part),
+                "{command}: no {part:?} in {help}"
+            );
+        }
+    }
+    for command in ["train", "resume", "extract"] {
+        let help = place.isomorph(&[command, "--help"]).succeeded().stdout;
+        assert!(
+            help.contains("--backend") && help.contains("[default: flex]"),
+            "{help}"
+        );
+    }
+    assert!(overview.contains("First steps"), "{overview}");
+    let version = place.isomorph(&["--version"]).succeeded().stdout;
+    assert!(
+        version.starts_with("isomorph ") && version.contains('.'),
+        "{version}"
+    );
+}

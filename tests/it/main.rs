@@ -1,0 +1,14 @@
+//! The program end to end: every test runs the real binary in a temporary folder. `tests/README.md` says
+//! how to run them.
+
+mod backends;
+mod bad_recipes;
+mod bad_runs;
+mod bad_shapes;
+mod closed_forms;
+mod extraction;
+mod golden;
+mod information;
+mod outputs;
+mod resume;
+mod support;

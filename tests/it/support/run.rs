@@ -1,0 +1,141 @@
+//! The folder of a run, as a user finds it.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use super::workplace::names;
+
+/// The folder of a run.
+#[derive(Clone, Debug)]
+pub struct Run(pub PathBuf);
+
+/// One line of `metrics.jsonl`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Logged {
+    pub step: u64,
+    pub phase: String,
+    /// The terms before their weights, by name.
+    pub terms: BTreeMap<String, f64>,
+}
+
+/// One entry of `frames.json`.
+#[derive(Clone, Debug)]
+pub struct Frame {
+    pub time: f64,
+    pub surface: PathBuf,
+    pub carried: Option<PathBuf>,
+    /// Mean over the surface's vertices of ||grad f| - 1|.
+    pub slope_error: f64,
+}
+
+impl Run {
+    /// A file or folder in it.
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.0.join(name)
+    }
+
+    /// The names of the checkpoints, oldest first.
+    pub fn checkpoints(&self) -> Vec<String> {
+        names(&self.path("checkpoints"))
+    }
+
+    /// The folder of the newest checkpoint.
+    pub fn newest(&self) -> PathBuf {
+        let all = self.checkpoints();
+        self.path("checkpoints")
+            .join(all.last().expect("at least one checkpoint"))
+    }
+
+    /// The steps done in the newest checkpoint.
+    pub fn step(&self) -> u64 {
+        self.state()["step"].as_u64().expect("a step")
+    }
+
+    /// `state.json` of the newest checkpoint.
+    pub fn state(&self) -> Value {
+        json(&self.newest().join("state.json"))
+    }
+
+    /// Both networks of the newest checkpoint, as bytes. (The records of the optimisers hold the same
+    /// numbers in an order that differs from one process to the next.)
+    pub fn networks(&self) -> [Vec<u8>; 2] {
+        ["implicit.mpk", "velocity.mpk"]
+            .map(|name| fs::read(self.newest().join(name)).expect("a record"))
+    }
+
+    /// `metrics.jsonl`.
+    pub fn metrics(&self) -> Vec<Logged> {
+        let text = fs::read_to_string(self.path("metrics.jsonl")).expect("metrics");
+        assert!(
+            text.is_empty() || text.ends_with('\n'),
+            "a torn last line: {text:?}"
+        );
+        let logged = text.lines().map(|line| {
+            let value: Value = serde_json::from_str(line).expect("a line of JSON");
+            let terms = value["terms"].as_object().expect("terms").iter();
+            Logged {
+                step: value["step"].as_u64().expect("a step"),
+                phase: value["phase"].as_str().expect("a phase").to_owned(),
+                terms: terms
+                    .map(|(name, term)| (name.clone(), term["raw"].as_f64().expect("a number")))
+                    .collect(),
+            }
+        });
+        logged.collect()
+    }
+
+    /// The steps in `metrics.jsonl`.
+    pub fn logged_steps(&self) -> Vec<u64> {
+        self.metrics().iter().map(|logged| logged.step).collect()
+    }
+
+    /// A copy of it as it was when a checkpoint had just been written, except that `metrics.jsonl` knows
+    /// the steps after it already, as after a kill.
+    pub fn cut_at(&self, step: u64, copy: &Run) {
+        copy_folder(&self.0, &copy.0);
+        for name in copy.checkpoints() {
+            let number: u64 = name.trim_start_matches("step-").parse().expect("a step");
+            if number > step {
+                fs::remove_dir_all(copy.path("checkpoints").join(name)).expect("a folder");
+            }
+        }
+        assert_eq!(copy.step(), step, "the run kept a checkpoint there");
+    }
+}
+
+/// Copies a folder with all that is in it.
+pub fn copy_folder(from: &Path, to: &Path) {
+    fs::create_dir_all(to).expect("a folder");
+    for name in names(from) {
+        let (from, to) = (from.join(&name), to.join(&name));
+        if from.is_dir() {
+            copy_folder(&from, &to);
+        } else {
+            fs::copy(&from, &to).expect("a copy");
+        }
+    }
+}
+
+/// Reads a JSON file.
+pub fn json(path: &Path) -> Value {
+    let text =
+        fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    serde_json::from_str(&text).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+/// Reads `frames.json` in a folder.
+pub fn frames(folder: &Path) -> Vec<Frame> {
+    let value = json(&folder.join("frames.json"));
+    let frames = value.as_array().expect("a list").iter().map(|entry| Frame {
+        time: entry["time"].as_f64().expect("a time"),
+        surface: folder.join(entry["surface"].as_str().expect("a file")),
+        carried: entry["carried"].as_str().map(|name| folder.join(name)),
+        slope_error: entry["slope_error"]
+            .as_f64()
+            .expect("slope_error, a number"),
+    });
+    frames.collect()
+}
