@@ -4,6 +4,7 @@
 //! compiled once per backend, which is most of the build: there are few.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Arc, Mutex};
 
 use burn::tensor::Tensor;
 use burn::tensor::backend::Backend;
@@ -99,6 +100,19 @@ pub fn run<T: Task>(
     }
 }
 
+/// Opens a backend's device and does nothing with it: so that what cannot work fails early.
+///
+/// # Errors
+/// Those of [`run`].
+pub fn check(backend: BackendName, device: Option<&str>) -> Result<(), BackendError> {
+    struct Nothing;
+    impl Task for Nothing {
+        type Output = ();
+        fn run<B: TrainBackend>(self, _: B::Device) {}
+    }
+    run(backend, device, Nothing)
+}
+
 fn only_cpu(device: Option<&str>) -> Result<(), BackendError> {
     match device {
         None | Some("default" | "cpu") => Ok(()),
@@ -132,23 +146,28 @@ fn wgpu_device(name: Option<&str>) -> Result<burn_wgpu::WgpuDevice, BackendError
 
 /// Opens the device and makes one value there: drivers that are missing make burn-wgpu panic.
 fn opens<B: Backend>(backend: &'static str, device: &B::Device) -> Result<(), BackendError> {
+    // The first panic, on whichever thread, says why; those that follow only pass it on.
+    let first = Arc::new(Mutex::new(None));
+    let seen = Arc::clone(&first);
     let hook = std::panic::take_hook();
-    std::panic::set_hook(Box::new(|_| {}));
+    std::panic::set_hook(Box::new(move |panic| {
+        let text = panic
+            .payload_as_str()
+            .unwrap_or("the driver gave no reason");
+        if let Ok(mut first) = seen.lock() {
+            first.get_or_insert_with(|| text.lines().next().unwrap_or_default().to_owned());
+        }
+    }));
     let opened = catch_unwind(AssertUnwindSafe(|| {
         Tensor::<B, 1>::ones([1], device).into_data();
     }));
     std::panic::set_hook(hook);
-    opened.map_err(|panic| {
-        let text = panic.downcast_ref::<String>().map(String::as_str);
-        let text = text.or_else(|| panic.downcast_ref::<&str>().copied());
-        let problem = text
-            .unwrap_or("the driver gave no reason")
-            .lines()
-            .next()
+    opened.map_err(|_| {
+        let problem = first
+            .lock()
+            .ok()
+            .and_then(|mut first| first.take())
             .unwrap_or_default();
-        BackendError::NoDevice {
-            backend,
-            problem: problem.to_owned(),
-        }
+        BackendError::NoDevice { backend, problem }
     })
 }

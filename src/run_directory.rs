@@ -25,12 +25,12 @@ pub enum RunError {
     #[error("{0}: not a run: it has no recipe.toml; give the folder that `isomorph train` made")]
     Missing(PathBuf),
     /// The file system refused.
-    #[error("{path}: {source}")]
+    #[error("{path}: {reason}")]
     Io {
         /// The folder.
         path: PathBuf,
         /// What it said.
-        source: io::Error,
+        reason: io::Error,
     },
 }
 
@@ -44,14 +44,14 @@ impl RunDirectory {
     /// # Errors
     /// [`RunError`]; with `force` an older run there is deleted first, and nothing but a run ever is.
     pub fn create(path: &Path, recipe: &str, force: bool) -> Result<Self, RunError> {
-        let io = |source| RunError::Io {
+        let io = |reason| RunError::Io {
             path: path.to_path_buf(),
-            source,
+            reason,
         };
         let occupied = match fs::read_dir(path) {
             Ok(mut entries) => entries.next().is_some(),
             Err(error) if error.kind() == io::ErrorKind::NotFound => false,
-            Err(source) => return Err(io(source)),
+            Err(reason) => return Err(io(reason)),
         };
         let run = Self(path.to_path_buf());
         if occupied {

@@ -1,5 +1,6 @@
 //! What the tests of this crate share: the backends they run on, and the way in and out of tensors.
 
+use burn::module::{Module, ModuleMapper, Param};
 use burn::tensor::{Tensor, TensorData, backend::Backend};
 use burn_autodiff::Autodiff;
 use burn_ndarray::NdArray;
@@ -33,4 +34,26 @@ pub fn host<B: Backend, const D: usize>(tensor: Tensor<B, D>) -> Vec<f64> {
         .convert::<f64>()
         .to_vec()
         .expect("a float tensor converts to f64")
+}
+
+/// Moves every weight by up to `by`, so that none that starts at zero hides a mistake.
+pub fn shaken<B: Backend, M: Module<B>>(net: M, by: f64) -> M {
+    struct Shake {
+        by: f64,
+        count: f64,
+    }
+    impl<B: Backend> ModuleMapper<B> for Shake {
+        fn map_float<const D: usize>(&mut self, param: Param<Tensor<B, D>>) -> Param<Tensor<B, D>> {
+            param.map(|weights| {
+                let shape = weights.shape();
+                let moved = host(weights).into_iter().map(|w| {
+                    self.count += 1.0;
+                    w + self.by * (2.3 * self.count).sin()
+                });
+                let data = TensorData::new(moved.collect::<Vec<f64>>(), shape);
+                Tensor::from_data(data, &Default::default()).require_grad()
+            })
+        }
+    }
+    net.map(&mut Shake { by, count: 0.0 })
 }

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use clap::Args;
 
 use super::Ending;
@@ -21,6 +21,7 @@ pub(super) struct InfoArgs {
 
 pub(super) fn run(args: InfoArgs) -> Result<Ending> {
     let path = &args.path;
+    std::fs::metadata(path).with_context(|| path.display().to_string())?;
     let extension = path
         .extension()
         .and_then(|text| text.to_str())

@@ -8,6 +8,7 @@ use clap::Args;
 use super::training::Training;
 use super::{BackendArgs, Ending, QuietArgs, SetArgs};
 use crate::atomic::write_atomically;
+use crate::backend;
 use crate::learner::checkpoint::{Checkpoint, CheckpointError};
 use crate::learner::event::Event;
 use crate::learner::settings;
@@ -49,6 +50,7 @@ pub(super) fn run(args: ResumeArgs) -> Result<Ending> {
         Some(checkpoint) => checkpoint.recipe()?.changes(&recipe),
         None => Vec::new(),
     };
+    backend::check(args.place.backend, args.place.device.as_deref())?;
     let pair = shape::prepare(&settings::data(&recipe))?;
     let step = checkpoint
         .as_ref()

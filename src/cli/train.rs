@@ -7,6 +7,7 @@ use clap::Args;
 
 use super::training::Training;
 use super::{BackendArgs, Ending, QuietArgs, SetArgs};
+use crate::backend;
 use crate::learner::event::Event;
 use crate::learner::settings;
 use crate::recipe::Recipe;
@@ -44,7 +45,8 @@ pub(super) struct TrainArgs {
 
 pub(super) fn run(args: TrainArgs) -> Result<Ending> {
     let recipe = Recipe::read(&args.recipe, &args.set.overrides)?;
-    // Before the run's folder exists: shapes that cannot be read leave nothing behind.
+    // Before the run's folder exists: what cannot be read or opened leaves nothing behind.
+    backend::check(args.place.backend, args.place.device.as_deref())?;
     let pair = shape::prepare(&settings::data(&recipe))?;
     let path = args.run.unwrap_or_else(|| default_run(&args.recipe));
     let run = RunDirectory::create(&path, &recipe.to_toml(), args.force)?;

@@ -80,12 +80,12 @@ impl FileDigest {
 #[derive(Debug, thiserror::Error)]
 pub enum CheckpointError {
     /// The file system refused.
-    #[error("{path}: {source}")]
+    #[error("{path}: {reason}")]
     Io {
         /// The file or folder.
         path: PathBuf,
         /// What it said.
-        source: io::Error,
+        reason: io::Error,
     },
     /// There is none to start from.
     #[error("{0}: no checkpoint here; start the run with `isomorph train`")]
@@ -131,9 +131,9 @@ impl Checkpoint {
     /// [`CheckpointError`] if `state.json` is missing, damaged or too new.
     pub fn open(path: &Path) -> Result<Self, CheckpointError> {
         let file = path.join(STATE);
-        let text = fs::read_to_string(&file).map_err(|source| CheckpointError::Io {
+        let text = fs::read_to_string(&file).map_err(|reason| CheckpointError::Io {
             path: file.clone(),
-            source,
+            reason,
         })?;
         let damaged = |error: serde_json::Error| CheckpointError::Damaged {
             path: file.clone(),
@@ -184,9 +184,9 @@ impl Checkpoint {
         device: &B::Device,
     ) -> Result<R, CheckpointError> {
         let path = self.path.join(part.file());
-        let content = fs::read(&path).map_err(|source| CheckpointError::Io {
+        let content = fs::read(&path).map_err(|reason| CheckpointError::Io {
             path: path.clone(),
-            source,
+            reason,
         })?;
         let damaged = |problem| CheckpointError::Damaged {
             path: path.clone(),
@@ -281,15 +281,15 @@ pub fn save(
         let _ = temporary.keep();
         flush_folder(folder)
     };
-    written().map_err(|source| CheckpointError::Io {
+    written().map_err(|reason| CheckpointError::Io {
         path: path.clone(),
-        source,
+        reason,
     })?;
     let all = list(folder);
     for (_, old) in &all[..all.len().saturating_sub(keep)] {
-        fs::remove_dir_all(old).map_err(|source| CheckpointError::Io {
+        fs::remove_dir_all(old).map_err(|reason| CheckpointError::Io {
             path: old.clone(),
-            source,
+            reason,
         })?;
     }
     Ok(path)
@@ -319,10 +319,15 @@ pub fn sweep(folder: &Path) {
     }
 }
 
+/// Writes a file down to the disk; an error names it.
 fn write_through(path: &Path, content: &[u8]) -> io::Result<()> {
-    let mut file = fs::File::create(path)?;
-    file.write_all(content)?;
-    file.sync_all()
+    let write = || {
+        let mut file = fs::File::create(path)?;
+        file.write_all(content)?;
+        file.sync_all()
+    };
+    let file = path.file_name().unwrap_or_default().to_string_lossy();
+    write().map_err(|error: io::Error| io::Error::new(error.kind(), format!("{file}: {error}")))
 }
 
 /// Makes the names in a folder as durable as the files; not every system can.

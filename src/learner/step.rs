@@ -65,22 +65,26 @@ impl<B: TrainBackend> Step<'_, B> {
         objective
     }
 
-    /// Carries the starts to their stops and, in the same trajectories, the correspondences to the other
-    /// end, which gives the matching term.
+    /// Carries the starts to their stops; in the phases that train `V` its trajectories are tracked, and
+    /// the correspondences travel along.
     fn carry(&self, batch: &Batch, objective: &mut Objective<B>) -> Carried<B> {
-        let times = column::<B>(&batch.stops, self.device);
         let (still, normals) = self.carry_constants(batch);
-        let carried = |positions| Carried {
-            positions,
-            still: still.clone(),
-            normals,
-            times,
+        let tracked = match self.phase {
+            Phase::ImplicitOnly => None,
+            Phase::WarmUp | Phase::Ramp | Phase::Joint => self.carry_tracked(batch, objective),
         };
-        if self.phase == Phase::ImplicitOnly {
-            return carried(Tensor::from_inner(still.clone()));
+        Carried {
+            positions: tracked.unwrap_or_else(|| Tensor::from_inner(still.clone())),
+            still,
+            normals,
+            times: column(&batch.stops, self.device),
         }
-        let matched = self.sizes.matched;
-        let joint = self.phase != Phase::WarmUp;
+    }
+
+    /// Carries the correspondences to the other end, which gives the matching term, and with them, in
+    /// the joint phases, the starts to their stops: the positions of these.
+    fn carry_tracked(&self, batch: &Batch, objective: &mut Objective<B>) -> Option<Tensor<B, 2>> {
+        let (joint, matched) = (self.phase != Phase::WarmUp, self.sizes.matched);
         let (sources, targets) = &batch.matched;
         let mut x = [&sources[..], targets].concat();
         let mut from = [vec![0.0; matched], vec![1.0; matched]].concat();
@@ -91,23 +95,12 @@ impl<B: TrainBackend> Step<'_, B> {
             to.extend(&batch.stops);
         }
         if x.is_empty() {
-            return carried(Tensor::from_inner(still.clone()));
+            return None;
         }
-        let rows = x.len();
-        let (x, from, to) = (
-            self.rows(&x),
-            column(&from, self.device),
-            column(&to, self.device),
-        );
+        let (from, to) = (column(&from, self.device), column(&to, self.device));
+        let (steps, integrator) = (self.settings.steps, self.settings.integrator);
         let rhs = |x, t| self.v.forward(x, t);
-        let arrived = integrate(
-            rhs,
-            x,
-            from,
-            to,
-            self.settings.steps,
-            self.settings.integrator,
-        );
+        let arrived = integrate(rhs, self.rows(&x), from, to, steps, integrator);
         let loss = &self.settings.loss;
         let weight = if joint {
             loss.matching
@@ -121,11 +114,7 @@ impl<B: TrainBackend> Step<'_, B> {
                 matching::matching(there, marks, loss.matching_scale)
             });
         }
-        if joint {
-            carried(arrived.slice([2 * matched..rows, 0..3]))
-        } else {
-            carried(Tensor::from_inner(still.clone()))
-        }
+        joint.then(|| arrived.slice([2 * matched..x.len(), 0..3]))
     }
 
     /// The same trajectories without a graph, with the normals where they are wanted.

@@ -10,14 +10,14 @@ use thiserror::Error;
 pub enum RecipeError {
     /// The file is missing, no file, or not text.
     #[error(
-        "{}: cannot be read ({source}); `isomorph init SOURCE TARGET` prints a recipe",
+        "{}: cannot be read ({reason}); `isomorph init SOURCE TARGET` prints a recipe",
         path.display()
     )]
     Unreadable {
         /// The recipe.
         path: PathBuf,
         /// What the file system says.
-        source: io::Error,
+        reason: io::Error,
     },
     /// The text is not TOML.
     #[error("{at}: not TOML ({reason}): `{line}`")]

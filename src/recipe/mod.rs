@@ -52,9 +52,9 @@ impl Recipe {
     /// # Errors
     /// If the file cannot be read, or for what [`Recipe::parse`] refuses.
     pub fn read(path: &Path, overrides: &[String]) -> Result<Recipe, RecipeError> {
-        let text = std::fs::read_to_string(path).map_err(|source| RecipeError::Unreadable {
+        let text = std::fs::read_to_string(path).map_err(|reason| RecipeError::Unreadable {
             path: path.to_owned(),
-            source,
+            reason,
         })?;
         Recipe::parse(&text, path, overrides)
     }

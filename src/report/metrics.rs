@@ -54,16 +54,16 @@ pub struct TermMetrics {
 #[derive(Debug, thiserror::Error)]
 pub enum MetricsError {
     /// The file system refused.
-    #[error("{path}: {source}")]
+    #[error("{path}: {reason}")]
     Io {
         /// The file.
         path: PathBuf,
         /// What it said.
-        source: io::Error,
+        reason: io::Error,
     },
     /// A line is something else.
     #[error(
-        "{path}:{line}: not the metrics of a step ({source}); delete the line, nothing else needs it"
+        "{path}:{line}: not the metrics of a step ({reason}); delete the line, nothing else needs it"
     )]
     Line {
         /// The file.
@@ -71,7 +71,7 @@ pub enum MetricsError {
         /// The line, counted from 1.
         line: usize,
         /// What is wrong with it.
-        source: serde_json::Error,
+        reason: serde_json::Error,
     },
 }
 
@@ -82,15 +82,15 @@ impl Metrics {
     /// # Errors
     /// [`MetricsError`].
     pub fn read(path: &Path) -> Result<Vec<Self>, MetricsError> {
-        let bytes = std::fs::read(path).map_err(|source| MetricsError::Io {
+        let bytes = std::fs::read(path).map_err(|reason| MetricsError::Io {
             path: path.to_path_buf(),
-            source,
+            reason,
         })?;
         let parsed = whole_lines(&bytes).enumerate().map(|(index, text)| {
-            serde_json::from_slice(text).map_err(|source| MetricsError::Line {
+            serde_json::from_slice(text).map_err(|reason| MetricsError::Line {
                 path: path.to_path_buf(),
                 line: index + 1,
-                source,
+                reason,
             })
         });
         parsed.collect()

@@ -75,6 +75,16 @@ pub struct FrameEntry {
     pub carried: Option<String>,
 }
 
+impl FrameEntry {
+    /// The files that it names.
+    fn files(&self) -> impl Iterator<Item = &str> {
+        [Some(&self.surface), self.carried.as_ref()]
+            .into_iter()
+            .flatten()
+            .map(String::as_str)
+    }
+}
+
 /// A surface that has been written.
 #[derive(Clone, Debug)]
 pub struct Frame {
@@ -97,12 +107,12 @@ pub enum FramesError {
     #[error(transparent)]
     Grid(#[from] GridError),
     /// No surface at a time.
-    #[error("time {time}: {source}")]
+    #[error("time {time}: {reason}")]
     Extract {
         /// The time.
         time: f64,
         /// Why.
-        source: ExtractError<Infallible>,
+        reason: ExtractError<Infallible>,
     },
     /// The shape to be carried cannot be read.
     #[error(transparent)]
@@ -120,65 +130,97 @@ pub enum FramesError {
 
 /// Writes the frames and `frames.json`; `done` is told of each and may stop the work by returning false.
 ///
+/// Files of an earlier extraction in the same folder that the new `frames.json` does not list are deleted.
+///
 /// # Errors
-/// [`FramesError`]; `frames.json` is written last, so a folder with one is complete.
+/// [`FramesError`]. `frames.json` is removed first and written last, so a folder with one is complete.
 pub fn write_frames<B: ModelBackend>(
     trained: &Trained<B>,
     options: &FrameOptions,
     mut done: impl FnMut(&Frame) -> io::Result<bool>,
 ) -> Result<Vec<Frame>, FramesError> {
     let grid = Grid::new(trained.bounds.min, trained.bounds.max, options.resolution)?;
+    let listing = options.folder.join("frames.json");
+    let earlier = take_listing(&listing)?;
     let carried = match &options.carry {
         Some(source) => carry(trained, source, options)?,
         None => vec![None; options.times.len()],
     };
     let mut frames = Vec::new();
-    for (k, (&time, carried)) in options.times.iter().zip(carried).enumerate() {
-        let surface = format!("surface-{k:03}.{}", options.format.extension());
-        let (mesh, touches_box, evaluated) = surface_at(trained, &grid, time)?;
-        let mesh = if options.smallest_component > 0.0 {
-            mesh.keep_at_least(options.smallest_component)
-        } else {
-            mesh
-        };
-        let (normals, slope_error) = normals(trained, &mesh.vertices, time);
-        let in_users: Vec<[f64; 3]> = mesh
-            .vertices
-            .iter()
-            .map(|x| trained.normalisation.invert(*x))
-            .collect();
-        let view = SurfaceView {
-            vertices: &in_users,
-            triangles: &mesh.triangles,
-            normals: Some(&normals),
-        };
-        write_surface(view, &options.folder.join(&surface), options.format)?;
-        let components = mesh.components().len();
-        let entry = FrameEntry {
-            time,
-            surface,
-            slope_error,
-            carried,
-        };
-        let frame = Frame {
-            entry,
-            mesh,
-            components,
-            touches_box,
-            evaluated,
-        };
+    for (k, carried) in carried.into_iter().enumerate() {
+        let frame = write_frame(trained, options, &grid, k, carried)?;
         let go_on = done(&frame)?;
         frames.push(frame);
-        if !go_on {
+        if !go_on && frames.len() < options.times.len() {
             return Ok(frames);
         }
     }
     let entries: Vec<&FrameEntry> = frames.iter().map(|frame| &frame.entry).collect();
     let text = serde_json::to_string_pretty(&entries).map_err(io::Error::other)?;
-    write_atomically(&options.folder.join("frames.json"), |out| {
-        out.write_all(text.as_bytes())
-    })?;
+    write_atomically(&listing, |out| out.write_all(text.as_bytes()))?;
+    let kept: Vec<&str> = entries.iter().flat_map(|entry| entry.files()).collect();
+    for stale in earlier
+        .iter()
+        .flat_map(FrameEntry::files)
+        .filter(|file| !kept.contains(file))
+    {
+        // Deleted or moved by the user meanwhile: nothing is missing then.
+        let _ = std::fs::remove_file(options.folder.join(stale));
+    }
     Ok(frames)
+}
+
+/// Reads and removes the listing of an earlier extraction; none, or not ours, is an empty one.
+fn take_listing(listing: &Path) -> io::Result<Vec<FrameEntry>> {
+    let Ok(text) = std::fs::read_to_string(listing) else {
+        return Ok(Vec::new());
+    };
+    std::fs::remove_file(listing)?;
+    let mut entries: Vec<FrameEntry> = serde_json::from_str(&text).unwrap_or_default();
+    // Names alone: a listing that someone edited deletes nothing outside its folder.
+    entries.retain(|entry| entry.files().all(|file| !file.contains(['/', '\\'])));
+    Ok(entries)
+}
+
+/// Extracts and writes frame `k`.
+fn write_frame<B: ModelBackend>(
+    trained: &Trained<B>,
+    options: &FrameOptions,
+    grid: &Grid,
+    k: usize,
+    carried: Option<String>,
+) -> Result<Frame, FramesError> {
+    let time = options.times[k];
+    let surface = format!("surface-{k:03}.{}", options.format.extension());
+    let (mut mesh, touches_box, evaluated) = surface_at(trained, grid, time)?;
+    if options.smallest_component > 0.0 {
+        mesh = mesh.keep_at_least(options.smallest_component);
+    }
+    let (normals, slope_error) = normals(trained, &mesh.vertices, time);
+    let vertices = mesh
+        .vertices
+        .iter()
+        .map(|x| trained.normalisation.invert(*x));
+    let view = SurfaceView {
+        vertices: &vertices.collect::<Vec<[f64; 3]>>(),
+        triangles: &mesh.triangles,
+        normals: Some(&normals),
+    };
+    write_surface(view, &options.folder.join(&surface), options.format)?;
+    let entry = FrameEntry {
+        time,
+        surface,
+        slope_error,
+        carried,
+    };
+    let components = mesh.components().len();
+    Ok(Frame {
+        entry,
+        mesh,
+        components,
+        touches_box,
+        evaluated,
+    })
 }
 
 /// The zero set at a time, whether it touches the box, and the share of the grid that was evaluated.
@@ -194,7 +236,7 @@ fn surface_at<B: ModelBackend>(
         });
         Ok::<_, Infallible>(values)
     };
-    let found = extract(field, grid).map_err(|source| FramesError::Extract { time, source })?;
+    let found = extract(field, grid).map_err(|reason| FramesError::Extract { time, reason })?;
     let share = found.evaluated as f64 / found.grid_points as f64;
     Ok((found.mesh, found.touches_box, share))
 }

@@ -5,46 +5,48 @@ use std::fs;
 
 use crate::support::workplace::{Ended, Workplace};
 
+/// Lines that are wrong, and what the message must say of each.
+const WRONG: &[(&str, &[&str])] = &[
+    ("training.stesp = 5", &["recipe.toml:13", "stesp", "steps"]),
+    (
+        "trainig.steps = 5",
+        &["recipe.toml:13", "trainig", "training"],
+    ),
+    (
+        "loss.divergence = \"two\"",
+        &["recipe.toml:13", "loss.divergence = \"two\"", "number"],
+    ),
+    (
+        "training.steps = 1.5",
+        &["recipe.toml:13", "training.steps = 1.5", "whole"],
+    ),
+    (
+        "loss.divergence = -1",
+        &["recipe.toml:13", "loss.divergence = -1", "0 or more"],
+    ),
+    (
+        "loss.strain = nan",
+        &["recipe.toml:13", "loss.strain = nan", "finite"],
+    ),
+    (
+        "result.resolution = 0",
+        &["recipe.toml:13", "resolution = 0", "from 8 to"],
+    ),
+    (
+        "training.integrator = \"verlet\"",
+        &["recipe.toml:13", "verlet", "midpoint"],
+    ),
+    (
+        "implicit.skip = 7",
+        &["recipe.toml:13", "implicit.skip = 7", "implicit.depth"],
+    ),
+    ("training.steps = = 5", &["recipe.toml:13", "not TOML"]),
+];
+
 #[test]
 fn a_bad_recipe_is_refused_with_file_line_key_value_and_what_is_allowed() {
-    // Keys stand from the sixth line on, after those of the two shapes.
-    let cases: &[(&str, &[&str])] = &[
-        ("training.stesp = 5", &["recipe.toml:13", "stesp", "steps"]),
-        (
-            "trainig.steps = 5",
-            &["recipe.toml:13", "trainig", "training"],
-        ),
-        (
-            "loss.divergence = \"two\"",
-            &["recipe.toml:13", "loss.divergence = \"two\"", "number"],
-        ),
-        (
-            "training.steps = 1.5",
-            &["recipe.toml:13", "training.steps = 1.5", "whole"],
-        ),
-        (
-            "loss.divergence = -1",
-            &["recipe.toml:13", "loss.divergence = -1", "0 or more"],
-        ),
-        (
-            "loss.strain = nan",
-            &["recipe.toml:13", "loss.strain = nan", "finite"],
-        ),
-        (
-            "result.resolution = 0",
-            &["recipe.toml:13", "resolution = 0", "from 8 to"],
-        ),
-        (
-            "training.integrator = \"verlet\"",
-            &["recipe.toml:13", "verlet", "midpoint"],
-        ),
-        (
-            "implicit.skip = 7",
-            &["recipe.toml:13", "implicit.skip = 7", "implicit.depth"],
-        ),
-        ("training.steps = = 5", &["recipe.toml:13", "not TOML"]),
-    ];
-    for (line, parts) in cases {
+    // Each stands on the last line of a recipe, the thirteenth, after twelve good ones.
+    for (line, parts) in WRONG {
         let place = Workplace::tiny(&[line]);
         let text = fs::read_to_string(place.path("recipe.toml")).expect("a recipe");
         assert_eq!(

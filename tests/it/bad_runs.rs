@@ -105,10 +105,18 @@ fn a_damaged_checkpoint_is_refused_with_its_file_and_what_to_do() {
         assert_eq!(copy.step(), 6);
         fs::remove_dir_all(&copy.0).expect("a folder");
     }
-    fs::remove_file(run.newest().join("velocity.mpk")).expect("a file");
-    place
-        .isomorph(&["extract", "run", "--quiet"])
-        .refused(1, &["velocity.mpk"]);
+}
+
+#[test]
+fn a_checkpoint_with_a_missing_file_is_refused_with_its_name() {
+    let _turn = turn();
+    let (place, run) = trained();
+    for file in ["velocity.mpk", "state.json"] {
+        fs::remove_file(run.newest().join(file)).expect("a file");
+        place
+            .isomorph(&["extract", "run", "--quiet"])
+            .refused(1, &[file, "No such file"]);
+    }
 }
 
 #[test]
@@ -251,4 +259,24 @@ fn a_full_disk_is_told_and_leaves_nothing_under_a_final_name() {
     ended.refused(1, &["surfaces/surface-000.ply", "File too large"]);
     let left = names(&place.path("surfaces"));
     assert_eq!(left, [""; 0], "half a surface");
+}
+
+#[test]
+fn a_run_without_a_surface_says_so_and_keeps_its_networks() {
+    let _turn = turn();
+    // The sphere that f starts from lies outside the box, and two steps do not bring it in.
+    let place = Workplace::tiny(&["training.steps = 2", "implicit.sphere-radius = 9"]);
+    let surfaces = ["--set", "result.frames=2", "--set", "result.resolution=32"];
+    let train = ["train", "recipe.toml", "--quiet", "--run", "run"];
+    let ended = place.isomorph(&[&train[..], &surfaces].concat());
+    ended.refused(1, &["time 0: ", "no surface", "train longer"]);
+    let run = place.run("run");
+    assert_eq!(run.step(), 2);
+    assert!(
+        !run.path("meshes/frames.json").exists(),
+        "a list of surfaces that are not there"
+    );
+    place
+        .isomorph(&["extract", "run", "--quiet"])
+        .refused(1, &["time 0: ", "no surface"]);
 }

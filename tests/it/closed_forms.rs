@@ -188,7 +188,7 @@ fn a_bar_that_turns_stays_a_bar() {
     };
     check(
         &motion,
-        // Measured: 0.0071, 0.0497, 0.0630, 0.0106, 0.2728; its edges, where |grad f| has no value, are most of the last.
+        // Measured: 0.0071, 0.0497, 0.0630, 0.0106, 0.2728.
         &Limits {
             mean: 0.012,
             max: 0.08,

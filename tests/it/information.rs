@@ -1,4 +1,6 @@
-//! `info` on every kind of thing, and the help texts.
+//! `info` on every kind of thing, `bench`, and the help texts.
+
+use serde_json::Value;
 
 use crate::support::mesh::Mesh;
 use crate::support::ply;
@@ -146,6 +148,12 @@ fn every_command_has_help_that_names_its_defaults() {
             );
         }
     }
+    assert!(overview.contains("First steps"), "{overview}");
+}
+
+#[test]
+fn the_help_of_what_computes_names_the_default_backend() {
+    let place = Workplace::new();
     for command in ["train", "resume", "extract"] {
         let help = place.isomorph(&[command, "--help"]).succeeded().stdout;
         assert!(
@@ -153,10 +161,37 @@ fn every_command_has_help_that_names_its_defaults() {
             "{help}"
         );
     }
-    assert!(overview.contains("First steps"), "{overview}");
     let version = place.isomorph(&["--version"]).succeeded().stdout;
     assert!(
         version.starts_with("isomorph ") && version.contains('.'),
         "{version}"
     );
+}
+
+#[test]
+fn bench_reports_the_cost_of_a_step_as_json() {
+    let _turn = turn();
+    let place = Workplace::new();
+    let bench = ["bench", "--size", "small", "--backend", "flex", "--json"];
+    let ended = place.isomorph(&bench).succeeded();
+    let report: Value = serde_json::from_str(&ended.stdout).expect("one object of JSON");
+    assert_eq!(
+        (&report["backend"], &report["size"]),
+        (&"flex".into(), &"small".into())
+    );
+    let phases = &report["phases"];
+    for value in [
+        &phases["warm_up"]["seconds_per_step"],
+        &phases["warm_up"]["gflop_per_step"],
+        &phases["joint"]["seconds_per_step"],
+        &phases["joint"]["gflop_per_step"],
+        &report["peak_bytes"],
+        &report["matmul_gflops"],
+    ] {
+        assert!(
+            value.as_f64().is_some_and(|number| number > 0.0),
+            "{report}"
+        );
+    }
+    assert_eq!(place.names(), [""; 0], "a bench leaves nothing");
 }

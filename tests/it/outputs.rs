@@ -30,7 +30,7 @@ fn keys(value: &Value) -> BTreeSet<&str> {
 }
 
 #[test]
-fn training_leaves_a_run_that_another_program_can_read() {
+fn training_leaves_a_whole_run_and_nothing_else() {
     let _turn = turn();
     let place = Workplace::tiny(KEYS);
     let run = place.train("run", SURFACES);
@@ -54,8 +54,18 @@ fn training_leaves_a_run_that_another_program_can_read() {
     );
     let picture = fs::read(meshes.join("preview.png")).expect("a picture");
     assert!(picture.starts_with(b"\x89PNG\r\n\x1a\n") && picture.len() > 1000);
+    let log = fs::read_to_string(run.path("run.log")).expect("a log");
+    // As in 2026-03-01T12:00:00Z.
+    let stamped = |line: &str| line.as_bytes().get(19..21) == Some(b"Z ") && &line[10..11] == "T";
+    assert!(log.lines().count() > 5 && log.lines().all(stamped), "{log}");
+}
 
-    // A field more or less is a change of the format, which others read.
+/// A field more or less is a change of the format, which others read.
+#[test]
+fn the_json_of_a_run_has_the_fields_that_are_documented_and_no_others() {
+    let _turn = turn();
+    let place = Workplace::tiny(KEYS);
+    let run = place.train("run", SURFACES);
     let text = fs::read_to_string(run.path("metrics.jsonl")).expect("metrics");
     let line: Value = serde_json::from_str(text.lines().last().expect("a line")).expect("JSON");
     let fields = [
@@ -72,7 +82,7 @@ fn training_leaves_a_run_that_another_program_can_read() {
     for term in line["terms"].as_object().expect("terms").values() {
         assert_eq!(keys(term), BTreeSet::from(["raw", "weighted"]));
     }
-    for entry in json(&meshes.join("frames.json"))
+    for entry in json(&run.path("meshes/frames.json"))
         .as_array()
         .expect("a list")
     {
@@ -96,10 +106,6 @@ fn training_leaves_a_run_that_another_program_can_read() {
         "step",
     ];
     assert_eq!(keys(&run.state()), BTreeSet::from(state));
-    let log = fs::read_to_string(run.path("run.log")).expect("a log");
-    // As in 2026-03-01T12:00:00Z.
-    let stamped = |line: &str| line.as_bytes().get(19..21) == Some(b"Z ") && &line[10..11] == "T";
-    assert!(log.lines().count() > 5 && log.lines().all(stamped), "{log}");
 }
 
 #[test]

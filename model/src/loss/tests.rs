@@ -1,9 +1,8 @@
 //! Each term on hand-worked points, and the gradient of each against differences of its values.
 
-use burn::module::{AutodiffModule, Module, ModuleMapper, ModuleVisitor, Param};
+use burn::module::{AutodiffModule, ModuleMapper, ModuleVisitor, Param};
 use burn::optim::GradientsParams;
 use burn::tensor::Tensor;
-use burn::tensor::backend::Backend;
 
 use super::*;
 use crate::activation::Activation;
@@ -12,7 +11,7 @@ use crate::implicit_net::{ImplicitNet, ImplicitNetConfig};
 use crate::operators::{
     Derivatives, ImplicitJet, Operators, VelocityJet, VelocityRequest, transport,
 };
-use crate::testing::{Plain, column, host, points};
+use crate::testing::{Plain, column, host, points, shaken};
 use crate::trajectory::{Integrator, Steps, integrate};
 use crate::velocity_net::{VelocityNet, VelocityNetConfig};
 
@@ -121,8 +120,8 @@ impl<B: TrainBackend> Scene<B> {
         };
         let device = Default::default();
         Self {
-            f: shifted(f.init(3, &device)),
-            v: shifted(v.init(4, &device)),
+            f: shaken(f.init(3, &device), 0.2),
+            v: shaken(v.init(4, &device), 0.2),
             derivatives,
         }
     }
@@ -177,25 +176,6 @@ impl<B: TrainBackend> Scene<B> {
         );
         Tensor::from_inner(n)
     }
-}
-
-/// Moves all weights off their initial values, of which some are zero.
-fn shifted<B: Backend, M: Module<B>>(net: M) -> M {
-    struct Shift(f64);
-    impl<B: Backend> ModuleMapper<B> for Shift {
-        fn map_float<const D: usize>(&mut self, param: Param<Tensor<B, D>>) -> Param<Tensor<B, D>> {
-            param.map(|weights| {
-                let shape = weights.shape();
-                let moved = host(weights).into_iter().map(|w| {
-                    self.0 += 1.0;
-                    w + 0.2 * (2.3 * self.0).sin()
-                });
-                let data = burn::tensor::TensorData::new(moved.collect::<Vec<f64>>(), shape);
-                Tensor::from_data(data, &Default::default()).require_grad()
-            })
-        }
-    }
-    net.map(&mut Shift(0.0))
 }
 
 /// Moves the weights along their gradient, scaled so that the whole step has length `length`.

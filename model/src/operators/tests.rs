@@ -8,7 +8,7 @@ use crate::activation::Activation;
 use crate::encoding::encoding_scale;
 use crate::implicit_net::ImplicitNetConfig;
 use crate::mlp::Mlp;
-use crate::testing::{Plain, column, host, points};
+use crate::testing::{Plain, column, host, points, shaken};
 use crate::velocity_net::VelocityNetConfig;
 
 const POINTS: [[f64; 3]; 4] = [
@@ -39,7 +39,7 @@ fn implicit(activation: Activation, frequencies: usize, skip: usize) -> Implicit
         skip,
         sphere_radius,
     };
-    shaken(config.init(7, &Default::default()))
+    shaken(config.init(7, &Default::default()), 0.3)
 }
 
 fn velocity(
@@ -57,32 +57,7 @@ fn velocity(
         skip,
         time_dependent,
     };
-    shaken(config.init(11, &Default::default()))
-}
-
-/// Moves every weight, so that no column that starts at zero hides a mistake.
-fn shaken<M: burn::module::Module<Plain>>(net: M) -> M {
-    struct Shake(f64);
-    impl burn::module::ModuleMapper<Plain> for Shake {
-        fn map_float<const D: usize>(
-            &mut self,
-            param: burn::module::Param<Tensor<Plain, D>>,
-        ) -> burn::module::Param<Tensor<Plain, D>> {
-            param.map(|weights| {
-                let shape = weights.shape();
-                let moved = host(weights).into_iter().map(|w| {
-                    self.0 += 1.0;
-                    w + 0.3 * (1.7 * self.0).sin()
-                });
-                let flat: Vec<f64> = moved.collect();
-                Tensor::from_data(
-                    burn::tensor::TensorData::new(flat, shape),
-                    &Default::default(),
-                )
-            })
-        }
-    }
-    net.map(&mut Shake(0.0))
+    shaken(config.init(11, &Default::default()), 0.3)
 }
 
 /// The perceptron in float64, written without tensors.

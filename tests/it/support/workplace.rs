@@ -21,8 +21,8 @@ impl Workplace {
     /// and `preset = "quick"` with more keys, each as in `training.steps=20`.
     pub fn with_pair(source: &Mesh, target: &Mesh, keys: &[&str]) -> Self {
         let place = Self::new();
-        place.write("source.ply", &ply::text(source));
-        place.write("target.ply", &ply::text(target));
+        place.write("source.ply", ply::text(source));
+        place.write("target.ply", ply::text(target));
         let mut recipe = String::from(
             "preset = \"quick\"\ndata.source = \"source.ply\"\ndata.target = \"target.ply\"\n",
         );
@@ -182,7 +182,7 @@ impl Ended {
     }
 }
 
-/// Tests that train do so one after the other: each uses all cores, and times out less for it.
+/// Tests that train do so one after the other, since each uses all cores.
 pub fn turn() -> MutexGuard<'static, ()> {
     static TURN: Mutex<()> = Mutex::new(());
     // A test that failed in its turn has nothing to leave in disorder.
