@@ -315,7 +315,7 @@ v 0 1 1\nv .5 1 1.5e0\nv 1 1 1\nf -5//1 -4//1 -1 -2 -3\n";
             for &index in &mesh.indices {
                 // tobj keeps float32 here; the house has only exact numbers.
                 let at = 3 * index as usize;
-                theirs.push([0, 1, 2].map(|axis| f64::from(mesh.positions[at + axis])));
+                theirs.push([0, 1, 2].map(|axis| mesh.positions[at + axis]));
             }
         }
         let house = read_text(HOUSE).expect("read");

@@ -69,14 +69,12 @@ fn mlp_in_f64(mlp: &Mlp<Plain>, input: &[f64]) -> Vec<f64> {
     let affine = |layer: &crate::mlp::Dense<Plain>, x: &[f64]| {
         let (weight, bias) = (host(layer.weight.val()), host(layer.bias.val()));
         let columns = bias.len();
-        let sum = |j: usize| {
-            x.iter()
-                .enumerate()
-                .map(|(i, x)| x * weight[i * columns + j])
-                .sum()
+        let product = |j: usize| -> f64 {
+            let terms = x.iter().enumerate();
+            terms.map(|(i, x)| x * weight[i * columns + j]).sum()
         };
         (0..columns)
-            .map(|j| bias[j] + <f64 as From<f64>>::from(sum(j)))
+            .map(|j| bias[j] + product(j))
             .collect::<Vec<f64>>()
     };
     let mut hidden = input.to_vec();
