@@ -9,6 +9,7 @@
 
 use burn::module::Module;
 use burn::tensor::Tensor;
+use burn::tensor::backend::Backend;
 use burn_autodiff::Autodiff;
 
 use super::{ImplicitJet, VelocityJet, VelocityRequest};
@@ -72,6 +73,13 @@ pub fn velocity_jet<B: ModelBackend>(
     }
 }
 
+/// Copies of the batch, one below the other.
+///
+/// Not `repeat_dim`: in burn 0.21 its backward adds up the wrong rows, without a word.
+fn stacked<B: Backend>(rows: Tensor<B, 2>, copies: usize) -> Tensor<B, 2> {
+    Tensor::cat(vec![rows; copies], 0)
+}
+
 /// Three copies of the batch, one per component of `V`; the gradient of copy `i` is row `i` of `J`.
 fn without_laplacian<B: ModelBackend>(
     net: &VelocityNet<B>,
@@ -81,8 +89,8 @@ fn without_laplacian<B: ModelBackend>(
 ) -> VelocityJet<B> {
     let n = x.dims()[0];
     let lifted = net.clone().train::<Autodiff<B>>().no_grad();
-    let x = lift(x.repeat_dim(0, 3));
-    let t = lift(t.repeat_dim(0, 3));
+    let x = lift(stacked(x, 3));
+    let t = lift(stacked(t, 3));
     let value = lifted.forward(x.clone(), t.clone());
     let sum = components(&value, n, 1);
     let mut grads = sum.backward();
@@ -112,9 +120,9 @@ fn with_laplacian<B: ModelBackend>(
     let n = x.dims()[0];
     let lifted = net.clone().train::<Autodiff<B>>().no_grad();
     let twice = lifted.train::<Autodiff<Autodiff<B>>>().no_grad();
-    let x1 = lift(x.repeat_dim(0, 9));
+    let x1 = lift(stacked(x, 9));
     let x2 = lift(x1.clone());
-    let t2 = lift(Tensor::<Autodiff<B>, 2>::from_inner(t.repeat_dim(0, 9)));
+    let t2 = lift(Tensor::<Autodiff<B>, 2>::from_inner(stacked(t, 9)));
     let value = twice.forward(x2.clone(), t2.clone());
     let mut grads = components(&value, n, 3).backward();
     let first = x2

@@ -8,7 +8,7 @@ use crate::activation::Activation;
 use crate::encoding::encoding_scale;
 use crate::implicit_net::ImplicitNetConfig;
 use crate::mlp::Mlp;
-use crate::testing::{Plain, column, host, points, shaken};
+use crate::testing::{Plain, Train, column, host, points, shaken};
 use crate::velocity_net::VelocityNetConfig;
 
 const POINTS: [[f64; 3]; 4] = [
@@ -358,4 +358,44 @@ fn a_shear_carries_normals_as_covectors() {
         1e-6,
         "normals",
     );
+}
+
+#[test]
+fn derivatives_can_be_differentiated_by_the_positions_both_ways() {
+    let request = VelocityRequest {
+        laplacian: true,
+        rate: false,
+    };
+    for request in [VelocityRequest::default(), request] {
+        let gradients = [Derivatives::Nested, Derivatives::Forward].map(|operators| {
+            let net: VelocityNet<Train> = VelocityNetConfig {
+                depth: 2,
+                width: 12,
+                activation: SOFT,
+                frequencies: 1,
+                skip: 0,
+                time_dependent: false,
+            }
+            .init(11, &Default::default());
+            let net = shaken(net, 0.3);
+            let x = points::<Train>(&POINTS).require_grad();
+            let jet = operators.velocity_jet(&net, x.clone(), column(&TIMES), request);
+            let mut sum = (jet.jacobian.clone() * jet.jacobian).sum();
+            if let Some(laplacian) = jet.laplacian {
+                sum = sum + (laplacian.clone() * laplacian).sum() * 1e-2;
+            }
+            host(x.grad(&sum.backward()).expect("J depends on the positions"))
+        });
+        let size = gradients[1]
+            .iter()
+            .fold(0.0, |most: f64, g| most.max(g.abs()));
+        // f32 rounding through three levels of differentiation.
+        assert_close(
+            &gradients[0],
+            &gradients[1],
+            2e-4 * size,
+            "by the positions",
+        );
+        assert!(size > 1e-2, "a gradient to compare: {size}");
+    }
 }
