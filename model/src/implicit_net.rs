@@ -22,6 +22,8 @@ use crate::backend::ModelBackend;
 use crate::encoding::{encode, encoded_width, encoding_scale};
 use crate::initial;
 use crate::mlp::{HostLayer, Mlp, MlpConfig};
+use crate::morph::Geometry;
+use crate::operators::reverse;
 
 /// Under the root of the sphere that a sine network is added to, so that it is smooth at 0.
 const ROUNDING: f64 = 0.01;
@@ -176,6 +178,17 @@ impl<B: ModelBackend> ImplicitNet<B> {
         let root = ((x.clone() * x.clone()).sum_dim(1) + ROUNDING).sqrt();
         let gradient = x / root.clone();
         Some((root - (radius * radius + ROUNDING).sqrt(), gradient))
+    }
+}
+
+impl<B: ModelBackend> Geometry<B> for ImplicitNet<B> {
+    fn value(&self, x: Tensor<B, 2>, t: Tensor<B, 2>) -> Tensor<B, 2> {
+        self.forward(x, t)
+    }
+
+    /// By the written-out reverse sweep: exact, and the only way on a backend without autodiff.
+    fn gradient(&self, x: Tensor<B, 2>, t: Tensor<B, 2>) -> Tensor<B, 2> {
+        reverse::implicit_jet(self, x, t).gradient
     }
 }
 

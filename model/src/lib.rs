@@ -16,6 +16,7 @@
 //! | `phi(x, t)` | [`trajectory::integrate`] | `[n, 3]` |
 //! | `gamma(x)`, positional encoding | [`encoding::encode`] | `[n, 3 (2 m + 1)]` |
 //! | `L_f`, `L_v`, `L_m` | one file per term in [`loss`], summed by [`Objective`] | `[1]` |
+//! | the methods compared with | one file each in [`baseline`], seen as [`Geometry`] or [`Motion`] | |
 //!
 //! Networks, operators and terms are generic over the burn backend. A training backend is
 //! `Autodiff<Inner>`; derivatives by the input lift it by one or two further levels of autodiff
@@ -27,6 +28,7 @@
 
 pub mod activation;
 pub mod backend;
+pub mod baseline;
 pub mod encoding;
 mod implicit_net;
 mod initial;
@@ -34,6 +36,7 @@ mod initial;
 mod kernel;
 pub mod loss;
 mod mlp;
+mod morph;
 mod objective;
 pub mod operators;
 pub mod trajectory;
@@ -42,6 +45,7 @@ mod velocity_net;
 pub use backend::{ModelBackend, TrainBackend};
 pub use implicit_net::{ImplicitNet, ImplicitNetConfig};
 pub use mlp::{Mlp, MlpConfig};
+pub use morph::{Geometry, Motion};
 pub use objective::{Objective, Term};
 pub use velocity_net::{VelocityNet, VelocityNetConfig};
 
