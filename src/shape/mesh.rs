@@ -125,7 +125,7 @@ impl EdgeSharing {
 }
 
 /// For each vertex the first one at the same position.
-fn weld(vertices: &[[f64; 3]]) -> Vec<u32> {
+pub(crate) fn weld(vertices: &[[f64; 3]]) -> Vec<u32> {
     let mut first = HashMap::with_capacity(vertices.len());
     let indices = 0..u32::try_from(vertices.len()).expect("triangles index vertices by u32");
     // Adding zero makes -0.0 and 0.0 the same bits.

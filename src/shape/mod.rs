@@ -4,8 +4,10 @@
 //! |---|---|
 //! | `ply.rs`, `obj.rs`, `anime.rs` | one reader per format: bytes in, [`Shape`] (or [`Sequence`]) out |
 //! | `mesh.rs` | measures of a triangle mesh: area, volume, how its edges are shared |
+//! | `connected.rs` | which vertices of a mesh hang together |
 //! | `sample.rs` | area-uniform points on a mesh |
 //! | `neighbours.rs` | k nearest neighbours |
+//! | `distance.rs` | signed distances to points with normals |
 //! | `normals.rs` | normals of a raw cloud, pointing outwards |
 //! | `correspond.rs` | pairs of vertices that are known to correspond |
 //! | `normalise.rs` | the joint frame in which the networks work, and the way back |
@@ -15,7 +17,9 @@
 //! order, counted from 0); a *point* is what the networks are trained on (float32, normalised).
 
 mod anime;
+pub(crate) mod connected;
 mod correspond;
+mod distance;
 mod error;
 #[cfg(test)]
 mod malformed;
@@ -32,6 +36,7 @@ mod testing;
 
 pub use anime::Sequence;
 pub use correspond::Correspondences;
+pub use distance::SignedDistance;
 pub use error::ShapeError;
 pub use neighbours::{Neighbour, NeighbourSearch};
 pub use normalise::{Bounds, Normalisation, cloud_area};

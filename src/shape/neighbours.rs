@@ -13,6 +13,10 @@ use rayon::prelude::*;
 /// How many points a leaf of the tree aims at.
 const BUCKET: usize = 32;
 
+/// Queries for one nearest point that a core takes at a time: each takes about a microsecond, which
+/// is less than handing it to another core.
+const QUERIES_AT_LEAST: usize = 256;
+
 /// One found neighbour.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Neighbour {
@@ -76,6 +80,15 @@ impl NeighbourSearch {
             .map(|&query| self.nearest(query, count))
             .collect()
     }
+
+    /// [`Self::nearest_one`] of each query, on all cores; the order of the queries is kept.
+    pub fn nearest_one_of_each(&self, queries: &[[f64; 3]]) -> Vec<Neighbour> {
+        queries
+            .par_iter()
+            .with_min_len(QUERIES_AT_LEAST)
+            .map(|&query| self.nearest_one(query))
+            .collect()
+    }
 }
 
 #[cfg(test)]
@@ -104,6 +117,11 @@ mod tests {
         let count = NonZeroUsize::new(9).expect("nine");
         let queries: Vec<[f64; 3]> = points.iter().step_by(points.len() / 50).copied().collect();
         let found = search.nearest_of_each(&queries, count);
+        let nearest: Vec<_> = queries
+            .iter()
+            .map(|&query| search.nearest_one(query))
+            .collect();
+        assert_eq!(search.nearest_one_of_each(&queries), nearest);
         for (query, neighbours) in queries.iter().zip(&found) {
             let expected = by_exhaustion(points, *query, 9);
             assert_eq!(neighbours.len(), 9);

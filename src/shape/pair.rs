@@ -85,6 +85,42 @@ pub struct Pair {
     pub notes: Vec<String>,
 }
 
+impl Pair {
+    /// Two spheres of points of radius 0.28 with normals, the second 0.2 further along x, of which the
+    /// first `known` points are known to correspond: shapes for measuring and testing that need no file.
+    pub fn spheres(points: usize, known: usize) -> Self {
+        let normals: Vec<[f32; 3]> = (0..points)
+            .map(|k| {
+                // A Fibonacci lattice: even, and the same everywhere.
+                let z = 1.0 - (2 * k + 1) as f64 / points as f64;
+                let (ring, angle) = ((1.0 - z * z).sqrt(), 2.399_963 * k as f64);
+                [ring * angle.cos(), ring * angle.sin(), z].map(|c| c as f32)
+            })
+            .collect();
+        let cloud = |offset: f32| Cloud {
+            points: normals
+                .iter()
+                .map(|[x, y, z]| [0.28 * x + offset, 0.28 * y, 0.28 * z])
+                .collect(),
+            normals: Some(normals.clone()),
+        };
+        let (source, target) = (cloud(-0.1), cloud(0.1));
+        let pairs = source.points.iter().copied();
+        let pairs = pairs.zip(target.points.iter().copied());
+        Self {
+            correspondences: pairs.take(known).collect(),
+            normalisation: Normalisation {
+                centre: [0.0; 3],
+                scale: 1.0,
+            },
+            bounds: Bounds::of(&source.points).union(&Bounds::of(&target.points)),
+            notes: Vec::new(),
+            source,
+            target,
+        }
+    }
+}
+
 /// What is drawn at random; each has its own stream, so that no choice shifts another.
 #[derive(Clone, Copy)]
 enum Draw {
