@@ -7,8 +7,6 @@ use burn::tensor::backend::Backend;
 use burn::tensor::{Distribution, Tensor};
 use clap::{Args, ValueEnum};
 use isomorph_model::TrainBackend;
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
 use super::{BackendArgs, Ending};
@@ -19,7 +17,7 @@ use crate::learner::event::Phase;
 use crate::learner::settings::Settings;
 use crate::learner::{flop, memory};
 use crate::recipe::Recipe;
-use crate::shape::{Bounds, Cloud, Normalisation, Pair};
+use crate::shape::Pair;
 
 /// Measure a training step: seconds, arithmetic, memory, and the share of the machine that it uses
 ///
@@ -47,6 +45,12 @@ pub(super) struct BenchArgs {
     #[command(flatten)]
     place: BackendArgs,
 }
+
+/// Points on each of the spheres that the step is made on.
+const POINTS: usize = 20_000;
+
+/// Correspondences between them.
+const CORRESPONDENCES: usize = 1000;
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum Size {
@@ -129,13 +133,8 @@ impl Task for BenchArgs {
         };
         let cost = |phase, warm_up: &str| -> Result<PhaseCost> {
             let recipe = recipe(self.size, derivatives, warm_up)?;
-            Ok(measure::<B>(
-                recipe,
-                phase,
-                self.repeats as usize,
-                matmul_gflops,
-                &device,
-            ))
+            let repeats = self.repeats as usize;
+            measure::<B>(recipe, phase, repeats, matmul_gflops, &device)
         };
         let phases = Phases {
             warm_up: cost(Phase::WarmUp, "1")?,
@@ -178,12 +177,12 @@ fn measure<B: TrainBackend>(
     repeats: usize,
     matmul_gflops: f64,
     device: &B::Device,
-) -> PhaseCost {
+) -> Result<PhaseCost> {
     let settings = Settings::new(&recipe);
-    let pair = spheres();
+    let pair = Pair::spheres(POINTS, CORRESPONDENCES);
     let sizes = BatchSizes::new(&settings.training, pair.correspondences.len());
     let gflop_per_step = flop::per_step(&settings, sizes, phase) / 1e9;
-    let mut learner = Learner::<B>::new(recipe, pair, device.clone());
+    let mut learner = Learner::<B>::new(recipe, pair, device.clone())?;
     let mut step = || {
         let clock = Instant::now();
         learner.advance(false);
@@ -194,12 +193,12 @@ fn measure<B: TrainBackend>(
     let first_step_seconds = step();
     let seconds_per_step = median((0..repeats).map(|_| step()).collect());
     let efficiency = gflop_per_step / seconds_per_step / matmul_gflops;
-    PhaseCost {
+    Ok(PhaseCost {
         seconds_per_step,
         first_step_seconds,
         gflop_per_step,
         efficiency,
-    }
+    })
 }
 
 /// GFLOP per second of a product of `4000 x 512` by `512 x 512`, the median of seven.
@@ -220,43 +219,6 @@ fn matmul_rate<B: Backend>(device: &B::Device) -> f64 {
 fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     values[values.len() / 2]
-}
-
-/// Two clouds of points on spheres a little apart, with normals and correspondences.
-fn spheres() -> Pair {
-    let rng = &mut ChaCha8Rng::seed_from_u64(0);
-    let mut direction = || loop {
-        let d: [f32; 3] = std::array::from_fn(|_| rng.random_range(-1.0..1.0));
-        let length = d.iter().map(|c| c * c).sum::<f32>().sqrt();
-        if (0.1..1.0).contains(&length) {
-            return d.map(|c| c / length);
-        }
-    };
-    let normals: Vec<[f32; 3]> = (0..20_000).map(|_| direction()).collect();
-    let cloud = |offset: f32| Cloud {
-        points: normals
-            .iter()
-            .map(|[x, y, z]| [0.28 * x + offset, 0.28 * y, 0.28 * z])
-            .collect(),
-        normals: Some(normals.clone()),
-    };
-    let (source, target) = (cloud(-0.1), cloud(0.1));
-    let pairs = source
-        .points
-        .iter()
-        .copied()
-        .zip(target.points.iter().copied());
-    Pair {
-        correspondences: pairs.take(1000).collect(),
-        normalisation: Normalisation {
-            centre: [0.0; 3],
-            scale: 1.0,
-        },
-        bounds: Bounds::of(&source.points).union(&Bounds::of(&target.points)),
-        notes: Vec::new(),
-        source,
-        target,
-    }
 }
 
 fn print_table(measured: &Measured) {

@@ -2,18 +2,19 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::{Args, ValueEnum};
 use isomorph_model::TrainBackend;
 
+use super::trained;
 use super::training::write_and_show;
 use super::{BackendArgs, Ending, QuietArgs, Usage, even_times, stop_on_interrupt};
 use crate::backend::{self, Task};
-use crate::learner::checkpoint::{Checkpoint, Part};
-use crate::learner::settings;
+use crate::learner::checkpoint::Checkpoint;
+use crate::recipe::Recipe;
 use crate::report::Reporter;
 use crate::run_directory::RunDirectory;
-use crate::surface::frames::{FrameOptions, Trained};
+use crate::surface::frames::FrameOptions;
 use crate::surface::write::SurfaceFormat;
 
 /// Write the surfaces of a trained run at any times, in any resolution
@@ -107,6 +108,7 @@ pub(super) fn run(args: ExtractArgs) -> Result<Ending> {
     let place = args.place.clone();
     let task = Extract {
         checkpoint,
+        recipe,
         options,
         reporter,
     };
@@ -115,6 +117,7 @@ pub(super) fn run(args: ExtractArgs) -> Result<Ending> {
 
 struct Extract {
     checkpoint: Checkpoint,
+    recipe: Recipe,
     options: FrameOptions,
     reporter: Reporter,
 }
@@ -123,7 +126,7 @@ impl Task for Extract {
     type Output = Result<Ending>;
 
     fn run<B: TrainBackend>(mut self, device: B::Device) -> Self::Output {
-        let trained = load::<B>(&self.checkpoint, device)?;
+        let trained = trained::load::<B>(&self.checkpoint, &self.recipe, device)?;
         let stop = stop_on_interrupt()?;
         let ending = write_and_show(&trained, &self.options, &stop, &mut self.reporter)?;
         if ending == Ending::Done {
@@ -131,29 +134,4 @@ impl Task for Extract {
         }
         Ok(ending)
     }
-}
-
-/// The networks of a checkpoint, for values.
-fn load<B: TrainBackend>(
-    checkpoint: &Checkpoint,
-    device: B::Device,
-) -> Result<Trained<B::InnerBackend>> {
-    use burn::module::Module;
-    let recipe = checkpoint
-        .recipe()
-        .context("the recipe in the checkpoint")?;
-    let implicit = settings::implicit(&recipe).init::<B::InnerBackend>(0, &device);
-    let velocity = settings::velocity(&recipe).init::<B::InnerBackend>(0, &device);
-    Ok(Trained {
-        implicit: implicit
-            .load_record(checkpoint.load::<B::InnerBackend, _>(Part::Implicit, &device)?),
-        velocity: velocity
-            .load_record(checkpoint.load::<B::InnerBackend, _>(Part::Velocity, &device)?),
-        normalisation: checkpoint.state.normalisation,
-        bounds: checkpoint
-            .state
-            .bounds
-            .padded(recipe.training.box_margin as f32),
-        device,
-    })
 }

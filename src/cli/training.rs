@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use anyhow::Result;
 use isomorph_model::{ModelBackend, TrainBackend};
 
+use super::trained;
 use super::{BackendArgs, Ending, even_times, stop_on_interrupt};
 use crate::backend::{self, Task};
 use crate::learner::checkpoint::Checkpoint;
@@ -56,11 +57,13 @@ impl Task for Train {
             checkpoint,
             mut reporter,
         } = self.training;
-        let (normalisation, bounds) = (pair.normalisation, pair.bounds);
-        let margin = recipe.training.box_margin as f32;
-        let result = recipe.result.clone();
+        let frame = trained::Frame {
+            normalisation: pair.normalisation,
+            bounds: pair.bounds,
+        };
+        let (result, known) = (recipe.result.clone(), recipe.clone());
         let mut learner = match &checkpoint {
-            None => Learner::<B>::new(recipe, pair, device.clone()),
+            None => Learner::<B>::new(recipe, pair, device.clone())?,
             Some(checkpoint) => Learner::<B>::resume(recipe, pair, device.clone(), checkpoint)?,
         };
         let mut emit = |event: Event| reporter.handle(&event);
@@ -71,13 +74,7 @@ impl Task for Train {
         if result.frames == 0 {
             return Ok(Ending::Done);
         }
-        let trained = Trained {
-            implicit: learner.implicit(),
-            velocity: learner.velocity(),
-            normalisation,
-            bounds: bounds.padded(margin),
-            device,
-        };
+        let trained = trained::trained(learner.method(), &known, frame, device)?;
         let options = FrameOptions {
             times: even_times(result.frames),
             resolution: result.resolution,

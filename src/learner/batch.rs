@@ -11,12 +11,14 @@
 //! The band needs the carried positions, which only the device knows: here stand its offsets from them.
 //! The shares are those of the prototype study (`shared/probes/prototype.md`, section 3).
 
+use std::num::NonZeroUsize;
+
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::recipe::{TimeSampling, TrainingRecipe};
-use crate::shape::{Bounds, Cloud, Pair};
+use crate::shape::{Bounds, Cloud, NeighbourSearch, Pair};
 
 /// How many samples of each kind a step takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -96,15 +98,7 @@ pub fn draw(pair: &Pair, training: &TrainingRecipe, sizes: BatchSizes, step: usi
     let stops = (0..2 * sizes.carried)
         .map(|_| time(training, rng))
         .collect();
-    let offsets = (0..sizes.band)
-        .map(|_| {
-            let width = training.band_widths[rng.random_range(0..training.band_widths.len())];
-            [(); 3].map(|()| {
-                let normal: f32 = StandardNormal.sample(rng);
-                normal * width as f32
-            })
-        })
-        .collect();
+    let offsets = (0..sizes.band).map(|_| offset(training, rng)).collect();
     let bounds = pair.bounds.padded(training.box_margin as f32);
     let uniform = Samples {
         points: (0..sizes.uniform).map(|_| within(&bounds, rng)).collect(),
@@ -123,6 +117,113 @@ pub fn draw(pair: &Pair, training: &TrainingRecipe, sizes: BatchSizes, step: usi
         uniform,
         matched,
     }
+}
+
+/// The samples of one step of a method that is fitted at t = 0 and t = 1.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EndBatch {
+    /// Given points, half of `training.batch`; their times are 0 and 1, source first, in equal numbers.
+    pub surface: Samples,
+    /// Points near each surface (the band) and in the box, the other half; the same times and order.
+    pub space: Samples,
+    /// Times in `[0, 1]`, one for each point of `space`: for terms between the ends.
+    pub between: Vec<f32>,
+}
+
+/// The samples of `step` at both ends.
+pub fn draw_ends(pair: &Pair, training: &TrainingRecipe, step: usize) -> EndBatch {
+    let rng = &mut ChaCha8Rng::seed_from_u64(training.seed);
+    rng.set_stream(step as u64 + 1);
+    let count = (training.batch / 4).max(1);
+    let band = (count as f64 * training.band_share).round() as usize;
+    let bounds = pair.bounds.padded(training.box_margin as f32);
+    let (mut surface, mut space) = (Samples::default(), Samples::default());
+    for (cloud, time) in [(&pair.source, 0.0), (&pair.target, 1.0)] {
+        pick(cloud, time, count, &mut surface, rng);
+        for k in 0..count {
+            space.points.push(if k < band {
+                let near = cloud.points[rng.random_range(0..cloud.points.len())];
+                let by = offset(training, rng);
+                std::array::from_fn(|axis| near[axis] + by[axis])
+            } else {
+                within(&bounds, rng)
+            });
+            space.times.push(time);
+        }
+    }
+    let between = (0..2 * count).map(|_| time(training, rng)).collect();
+    EndBatch {
+        surface,
+        space,
+        between,
+    }
+}
+
+/// A random offset from the surface.
+fn offset(training: &TrainingRecipe, rng: &mut impl Rng) -> [f32; 3] {
+    let width = training.band_widths[rng.random_range(0..training.band_widths.len())];
+    [(); 3].map(|()| {
+        let normal: f32 = StandardNormal.sample(rng);
+        normal * width as f32
+    })
+}
+
+/// Correspondences drawn for a step, of the source and of the target; as many as the recipe asks for.
+pub fn draw_matched(
+    pair: &Pair,
+    training: &TrainingRecipe,
+    step: usize,
+) -> (Vec<[f32; 3]>, Vec<[f32; 3]>) {
+    let rng = &mut ChaCha8Rng::seed_from_u64(training.seed);
+    rng.set_stream(step as u64 + 1);
+    let known = &pair.correspondences;
+    let count = training.correspondence_batch.min(known.len());
+    (0..count)
+        .map(|_| known[rng.random_range(0..known.len())])
+        .unzip()
+}
+
+/// Points of one surface with a near neighbour of each, and the normals of both; all `[n, 3]`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Neighbouring {
+    /// The points.
+    pub points: Vec<[f32; 3]>,
+    /// Their normals.
+    pub normals: Vec<[f32; 3]>,
+    /// A near neighbour of each, another point.
+    pub neighbours: Vec<[f32; 3]>,
+    /// The neighbours' normals.
+    pub neighbour_normals: Vec<[f32; 3]>,
+}
+
+/// Nearest points among which a neighbour is drawn.
+const AROUND: NonZeroUsize = NonZeroUsize::new(9).expect("9 is not 0");
+
+/// A quarter of `training.batch` points of a cloud with normals, each with one of its eight nearest.
+pub fn draw_neighbours(
+    cloud: &Cloud,
+    search: &NeighbourSearch,
+    training: &TrainingRecipe,
+    step: usize,
+) -> Neighbouring {
+    let rng = &mut ChaCha8Rng::seed_from_u64(training.seed);
+    rng.set_stream(step as u64 + 1);
+    let mut drawn = Neighbouring::default();
+    let Some(normals) = &cloud.normals else {
+        return drawn;
+    };
+    for _ in 0..(training.batch / 4).max(1) {
+        let k = rng.random_range(0..cloud.points.len());
+        let around = search.nearest(cloud.points[k].map(f64::from), AROUND);
+        // The first is the point itself, or one in the same place.
+        let place = rng.random_range(1..around.len());
+        let near = around[place].index as usize;
+        drawn.points.push(cloud.points[k]);
+        drawn.normals.push(normals[k]);
+        drawn.neighbours.push(cloud.points[near]);
+        drawn.neighbour_normals.push(normals[near]);
+    }
+    drawn
 }
 
 fn pick(cloud: &Cloud, time: f32, count: usize, into: &mut Samples, rng: &mut impl Rng) {

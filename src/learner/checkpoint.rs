@@ -4,6 +4,8 @@
 //! checkpoints/step-000500/
 //!   implicit.mpk  implicit-optimiser.mpk  velocity.mpk  velocity-optimiser.mpk
 //!   state.json    the step, what made it, and the size and checksum of every other file
+//!
+//! (other methods have other networks, each with its optimiser)
 //! ```
 //!
 //! The folder is written under a temporary name, flushed, and renamed. `state.json` is read first; a file
@@ -18,6 +20,7 @@ use burn::record::{FullPrecisionSettings, NamedMpkBytesRecorder, Record, Recorde
 use burn::tensor::backend::Backend;
 use serde::{Deserialize, Serialize};
 
+use super::method::Records;
 use crate::recipe::{Recipe, RecipeError};
 use crate::shape::{Bounds, Normalisation};
 
@@ -174,16 +177,16 @@ impl Checkpoint {
         )?)
     }
 
-    /// Reads one record, checked against its digest.
+    /// Reads the record in a file, checked against its digest.
     ///
     /// # Errors
     /// [`CheckpointError::Damaged`] if it is not what was written.
     pub fn load<B: Backend, R: Record<B>>(
         &self,
-        part: Part,
+        file: &str,
         device: &B::Device,
     ) -> Result<R, CheckpointError> {
-        let path = self.path.join(part.file());
+        let path = self.path.join(file);
         let content = fs::read(&path).map_err(|reason| CheckpointError::Io {
             path: path.clone(),
             reason,
@@ -193,7 +196,7 @@ impl Checkpoint {
             problem,
         };
         let found = FileDigest::of(&content);
-        match self.state.files.get(part.file()) {
+        match self.state.files.get(file) {
             None => return Err(damaged(format!("not named in {STATE}"))),
             Some(wanted) if wanted.bytes != found.bytes => {
                 return Err(damaged(format!(
@@ -208,30 +211,6 @@ impl Checkpoint {
         }
         let recorder = NamedMpkBytesRecorder::<FullPrecisionSettings>::default();
         Recorder::<B>::load(&recorder, content, device).map_err(|error| damaged(error.to_string()))
-    }
-}
-
-/// The records in a checkpoint.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Part {
-    /// The Implicit-Net.
-    Implicit,
-    /// Its optimiser.
-    ImplicitOptimiser,
-    /// The Velocity-Net.
-    Velocity,
-    /// Its optimiser.
-    VelocityOptimiser,
-}
-
-impl Part {
-    const fn file(self) -> &'static str {
-        match self {
-            Self::Implicit => "implicit.mpk",
-            Self::ImplicitOptimiser => "implicit-optimiser.mpk",
-            Self::Velocity => "velocity.mpk",
-            Self::VelocityOptimiser => "velocity-optimiser.mpk",
-        }
     }
 }
 
@@ -252,12 +231,13 @@ pub fn encode<B: Backend>(record: impl Record<B>) -> io::Result<Vec<u8>> {
 pub fn save(
     folder: &Path,
     mut state: State,
-    parts: Vec<(Part, Vec<u8>)>,
+    files: Records,
     keep: usize,
 ) -> Result<PathBuf, CheckpointError> {
-    state.files = parts
+    let Records(files) = files;
+    state.files = files
         .iter()
-        .map(|(part, bytes)| (part.file().into(), FileDigest::of(bytes)))
+        .map(|(name, bytes)| (name.clone(), FileDigest::of(bytes)))
         .collect();
     let path = folder.join(format!("step-{:06}", state.step));
     let written = || -> io::Result<()> {
@@ -265,8 +245,8 @@ pub fn save(
         let temporary = tempfile::Builder::new()
             .prefix(".step-")
             .tempdir_in(folder)?;
-        for (part, bytes) in &parts {
-            write_through(&temporary.path().join(part.file()), bytes)?;
+        for (name, bytes) in &files {
+            write_through(&temporary.path().join(name), bytes)?;
         }
         write_through(
             &temporary.path().join(STATE),

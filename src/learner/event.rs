@@ -20,6 +20,12 @@ pub enum Phase {
     Joint,
     /// The Velocity-Net is done; only the Implicit-Net trains.
     ImplicitOnly,
+    /// A method it is compared with: what is fitted at t = 0 and t = 1.
+    Ends,
+    /// A method it is compared with: what lies between, the ends being done.
+    Between,
+    /// A method it is compared with: what moves points.
+    Motion,
 }
 
 impl fmt::Display for Phase {
@@ -29,6 +35,9 @@ impl fmt::Display for Phase {
             Self::Ramp => "ramp",
             Self::Joint => "joint",
             Self::ImplicitOnly => "implicit only",
+            Self::Ends => "ends",
+            Self::Between => "between",
+            Self::Motion => "motion",
         })
     }
 }
@@ -80,10 +89,8 @@ pub enum Event {
         steps: usize,
         /// Steps that were done before: 0, or those of the checkpoint.
         first_step: usize,
-        /// Weights of the Implicit-Net.
-        implicit_parameters: usize,
-        /// Weights of the Velocity-Net.
-        velocity_parameters: usize,
+        /// The networks and how many weights each has.
+        networks: Vec<(&'static str, usize)>,
         /// Points sampled on the source.
         source_points: usize,
         /// Points sampled on the target.

@@ -1,11 +1,12 @@
-//! The learner: the loop that trains both networks, from the first step or from a checkpoint.
+//! The learner: the loop that trains a method, from the first step or from a checkpoint.
 //!
 //! | file | what it holds |
 //! |---|---|
+//! | `method/` | what is trained: our method and those that it is compared with |
 //! | `settings.rs` | the recipe in the model's types |
-//! | `schedule.rs` | phases, ramp and learning rates by step |
+//! | `schedule.rs` | our method's phases, ramp and learning rates by step |
 //! | `batch.rs` | the samples of a step, on the host |
-//! | `step.rs` | the objective of a step, on the device |
+//! | `step.rs` | the objective of a step of our method, on the device |
 //! | `optimiser.rs` | Adam with a limited gradient |
 //! | `checkpoint.rs` | whole checkpoints or none |
 //! | `event.rs` | what the loop reports |
@@ -19,6 +20,7 @@ pub mod checkpoint;
 pub mod event;
 pub mod flop;
 pub mod memory;
+pub mod method;
 mod optimiser;
 pub mod schedule;
 pub mod settings;
@@ -28,20 +30,14 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use burn::module::{AutodiffModule, Module};
-use burn::optim::Optimizer;
 use burn::tensor::backend::Backend;
-use isomorph_model::{ImplicitNet, Objective, TrainBackend, VelocityNet};
+use isomorph_model::{Objective, TrainBackend};
 
 use crate::recipe::Recipe;
 use crate::shape::Pair;
-use batch::BatchSizes;
-use checkpoint::{Checkpoint, CheckpointError, Part, State};
-use event::{Event, Phase, StepReport, TermReport};
-use optimiser::AdamOf;
-use schedule::Schedule;
-use settings::Settings;
-use step::Step;
+use checkpoint::{Checkpoint, CheckpointError, State};
+use event::{Event, StepReport, TermReport};
+use method::{Method, TrainingData};
 
 /// Why training stopped before its last step.
 #[derive(Debug, thiserror::Error)]
@@ -60,6 +56,9 @@ pub enum LearnerError {
         /// Where the last good checkpoint is.
         last: String,
     },
+    /// The method needs what the shapes do not have.
+    #[error("{0}")]
+    Missing(String),
     /// The networks of the recipe are not those of the checkpoint.
     #[error("{0}")]
     OtherNetworks(String),
@@ -85,41 +84,32 @@ pub enum Outcome {
     Interrupted,
 }
 
-/// Both networks, their optimisers, and where training stands.
+/// A method, its data, and where training stands.
 pub struct Learner<B: TrainBackend> {
     recipe: Recipe,
-    settings: Settings,
-    schedule: Schedule,
-    pair: Pair,
-    sizes: BatchSizes,
+    data: TrainingData,
     device: B::Device,
-    implicit: ImplicitNet<B>,
-    velocity: VelocityNet<B>,
-    implicit_optimiser: AdamOf<ImplicitNet<B>, B>,
-    velocity_optimiser: AdamOf<VelocityNet<B>, B>,
+    method: Box<dyn Method<B>>,
     step: usize,
     seconds: f64,
 }
 
 impl<B: TrainBackend> Learner<B> {
     /// A learner before its first step.
-    pub fn new(recipe: Recipe, pair: Pair, device: B::Device) -> Self {
-        let settings = Settings::new(&recipe);
-        let seed = settings.training.seed;
-        Self {
-            schedule: Schedule::new(&settings.training),
-            sizes: BatchSizes::new(&settings.training, pair.correspondences.len()),
-            implicit: settings.implicit.init(seed, &device),
-            velocity: settings.velocity.init(seed.wrapping_add(1), &device),
-            implicit_optimiser: optimiser::adam(),
-            velocity_optimiser: optimiser::adam(),
+    ///
+    /// # Errors
+    /// [`LearnerError::Missing`] if the recipe's method needs normals or correspondences and there are
+    /// none.
+    pub fn new(recipe: Recipe, pair: Pair, device: B::Device) -> Result<Self, LearnerError> {
+        method::check(&recipe, &pair).map_err(LearnerError::Missing)?;
+        Ok(Self {
+            method: method::build(&recipe, &pair.bounds, &device),
+            data: TrainingData::new(pair),
             step: 0,
             seconds: 0.0,
             recipe,
-            settings,
-            pair,
             device,
-        }
+        })
     }
 
     /// A learner that goes on from a checkpoint.
@@ -147,34 +137,26 @@ impl<B: TrainBackend> Learner<B> {
         if checkpoint.state.normalisation != pair.normalisation {
             return Err(LearnerError::OtherShapes(checkpoint.path.clone()));
         }
-        let mut learner = Self::new(recipe, pair, device);
-        let device = &learner.device;
-        let implicit = checkpoint.load::<B, _>(Part::Implicit, device)?;
-        let velocity = checkpoint.load::<B, _>(Part::Velocity, device)?;
-        let implicit_state = checkpoint.load::<B, _>(Part::ImplicitOptimiser, device)?;
-        let velocity_state = checkpoint.load::<B, _>(Part::VelocityOptimiser, device)?;
-        learner.implicit = learner.implicit.load_record(implicit);
-        learner.velocity = learner.velocity.load_record(velocity);
-        learner.implicit_optimiser = learner.implicit_optimiser.load_record(implicit_state);
-        learner.velocity_optimiser = learner.velocity_optimiser.load_record(velocity_state);
+        let mut learner = Self::new(recipe, pair, device)?;
+        learner.method.restore(checkpoint)?;
         learner.step = checkpoint.state.step;
         learner.seconds = checkpoint.state.seconds;
         Ok(learner)
     }
 
-    /// The trained Implicit-Net, for values.
-    pub fn implicit(&self) -> ImplicitNet<B::InnerBackend> {
-        self.implicit.valid()
-    }
-
-    /// The trained Velocity-Net, for values.
-    pub fn velocity(&self) -> VelocityNet<B::InnerBackend> {
-        self.velocity.valid()
+    /// What is trained, as it stands.
+    pub fn method(&self) -> &dyn Method<B> {
+        &*self.method
     }
 
     /// Steps done.
     pub fn step_count(&self) -> usize {
         self.step
+    }
+
+    /// Seconds of training so far, over all resumes.
+    pub fn seconds(&self) -> f64 {
+        self.seconds
     }
 
     /// Trains to the last step, or until `stop` is set, and leaves a checkpoint either way.
@@ -189,15 +171,16 @@ impl<B: TrainBackend> Learner<B> {
     ) -> Result<Outcome, LearnerError> {
         checkpoint::sweep(checkpoints);
         emit(self.started())?;
-        let steps = self.settings.training.steps;
+        let steps = self.recipe.training.steps;
         let (before, clock) = (self.seconds, Instant::now());
         let mut saved = self.step > 0;
         let mut phase = None;
         while self.step < steps {
-            if phase != Some(self.schedule.phase(self.step)) {
-                phase = Some(self.schedule.phase(self.step));
+            let entered = self.method.phase(self.step);
+            if phase != Some(entered) {
+                phase = Some(entered);
                 emit(Event::PhaseEntered {
-                    phase: self.schedule.phase(self.step),
+                    phase: entered,
                     step: self.step,
                 })?;
             }
@@ -233,50 +216,22 @@ impl<B: TrainBackend> Learner<B> {
 
     /// One step of the optimisers; the unweighted terms with their weights if `read` asks for them.
     pub fn advance(&mut self, read: bool) -> Option<Vec<TermReport>> {
-        let phase = self.schedule.phase(self.step);
-        let batch = batch::draw(&self.pair, &self.settings.training, self.sizes, self.step);
-        let step = Step {
-            settings: &self.settings,
-            sizes: self.sizes,
-            phase,
-            ramp: self.schedule.ramp(self.step),
-            f: &self.implicit,
-            v: &self.velocity,
-            device: &self.device,
-        };
-        let objective = step.objective(&batch);
+        let objective = self.method.objective(&self.data, self.step);
         let report = read.then(|| term_reports(&objective));
         if let Some(total) = objective.total() {
-            self.descend(phase, &mut total.backward());
+            self.method.descend(self.step, &mut total.backward());
         }
         self.step += 1;
         report
     }
 
-    /// Moves the networks that train in this phase against their gradients.
-    fn descend(&mut self, phase: Phase, gradients: &mut B::Gradients) {
-        let clip = self.settings.training.clip;
-        if phase != Phase::WarmUp {
-            let rate = self.schedule.implicit_rate(self.step);
-            let net = self.implicit.clone();
-            let optimiser = &mut self.implicit_optimiser;
-            self.implicit = optimiser::advance(optimiser, net, gradients, rate, clip);
-        }
-        if phase != Phase::ImplicitOnly {
-            let rate = self.schedule.velocity_rate(self.step);
-            let net = self.velocity.clone();
-            let optimiser = &mut self.velocity_optimiser;
-            self.velocity = optimiser::advance(optimiser, net, gradients, rate, clip);
-        }
-    }
-
     fn is_logged(&self, done: usize) -> bool {
-        let training = &self.settings.training;
+        let training = &self.recipe.training;
         done == 1 || done.is_multiple_of(training.log_every) || done == training.steps
     }
 
     fn checkpoint_is_due(&self, done: usize) -> bool {
-        done.is_multiple_of(self.recipe.checkpoint.every) || done == self.settings.training.steps
+        done.is_multiple_of(self.recipe.checkpoint.every) || done == self.recipe.training.steps
     }
 
     /// Reports the terms of the step just made, or stops at one that is not finite.
@@ -288,15 +243,16 @@ impl<B: TrainBackend> Learner<B> {
     ) -> Result<(), LearnerError> {
         let wrong = terms.iter().find(|term| !term.raw.is_finite()).cloned();
         let made = self.step - 1;
+        let rates = self.method.rates(made);
         let report = StepReport {
             step: self.step,
-            steps: self.settings.training.steps,
-            phase: self.schedule.phase(made),
+            steps: self.recipe.training.steps,
+            phase: self.method.phase(made),
             seconds: self.seconds,
             total: terms.iter().map(|term| term.weighted).sum(),
             terms,
-            learning_rate: self.schedule.implicit_rate(made),
-            velocity_learning_rate: self.schedule.velocity_rate(made),
+            learning_rate: rates.implicit,
+            velocity_learning_rate: rates.velocity,
             peak_memory_bytes: memory::peak_memory_bytes(),
         };
         emit(Event::Step(report))?;
@@ -319,29 +275,9 @@ impl<B: TrainBackend> Learner<B> {
         checkpoints: &Path,
         emit: &mut dyn FnMut(Event) -> std::io::Result<()>,
     ) -> Result<(), LearnerError> {
-        let encoded = || {
-            Ok(vec![
-                (
-                    Part::Implicit,
-                    checkpoint::encode::<B>(self.implicit.clone().into_record())?,
-                ),
-                (
-                    Part::Velocity,
-                    checkpoint::encode::<B>(self.velocity.clone().into_record())?,
-                ),
-                (
-                    Part::ImplicitOptimiser,
-                    checkpoint::encode::<B>(self.implicit_optimiser.to_record())?,
-                ),
-                (
-                    Part::VelocityOptimiser,
-                    checkpoint::encode::<B>(self.velocity_optimiser.to_record())?,
-                ),
-            ])
-        };
-        let parts = encoded().map_err(LearnerError::Record)?;
+        let files = self.method.records().map_err(LearnerError::Record)?;
         let keep = self.recipe.checkpoint.keep;
-        let path = checkpoint::save(checkpoints, self.state(), parts, keep)?;
+        let path = checkpoint::save(checkpoints, self.state(), files, keep)?;
         emit(Event::Checkpoint {
             step: self.step,
             path,
@@ -350,34 +286,38 @@ impl<B: TrainBackend> Learner<B> {
     }
 
     fn state(&self) -> State {
-        let networks = format!("{:?} {:?}", self.settings.implicit, self.settings.velocity);
+        let recipe = &self.recipe;
+        let networks = format!(
+            "{:?} {:?} {:?}",
+            recipe.method, recipe.implicit, recipe.velocity
+        );
         State {
             format_version: checkpoint::FORMAT_VERSION,
             isomorph_version: env!("CARGO_PKG_VERSION").to_owned(),
             burn_version: checkpoint::BURN_VERSION.to_owned(),
             step: self.step,
             seconds: self.seconds,
-            seed: self.settings.training.seed,
+            seed: recipe.training.seed,
             backend: B::InnerBackend::name(&self.device),
             network_digest: format!("{:08x}", crc32fast::hash(networks.as_bytes())),
-            normalisation: self.pair.normalisation,
-            bounds: self.pair.bounds,
-            recipe: self.recipe.to_toml(),
+            normalisation: self.data.pair.normalisation,
+            bounds: self.data.pair.bounds,
+            recipe: recipe.to_toml(),
             files: Default::default(),
         }
     }
 
     fn started(&self) -> Event {
+        let pair = &self.data.pair;
         Event::Started {
             backend: B::InnerBackend::name(&self.device),
             device: format!("{:?}", self.device),
-            steps: self.settings.training.steps,
+            steps: self.recipe.training.steps,
             first_step: self.step,
-            implicit_parameters: self.implicit.num_params(),
-            velocity_parameters: self.velocity.num_params(),
-            source_points: self.pair.source.points.len(),
-            target_points: self.pair.target.points.len(),
-            correspondences: self.pair.correspondences.len(),
+            networks: self.method.networks(),
+            source_points: pair.source.points.len(),
+            target_points: pair.target.points.len(),
+            correspondences: pair.correspondences.len(),
         }
     }
 }

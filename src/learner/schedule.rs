@@ -63,9 +63,11 @@ impl Schedule {
         )
     }
 
-    /// A cosine falls over the network's own active span, `from .. until`; steps fall over the whole run
+    /// The learning rate of a network that starts at `first` and trains in steps `from .. until`.
+    ///
+    /// A cosine falls over that span; steps fall over the whole run
     /// (the paper's decay of 0.5 every 2000 of 10,000 steps).
-    fn rate(&self, first: f64, step: usize, from: usize, until: usize) -> f64 {
+    pub fn rate(&self, first: f64, step: usize, from: usize, until: usize) -> f64 {
         match self.training.schedule {
             Fall::Cosine => {
                 let span = until.saturating_sub(from).max(1) as f64;

@@ -71,7 +71,7 @@ impl<B: TrainBackend> Step<'_, B> {
         let (still, normals) = self.carry_constants(batch);
         let tracked = match self.phase {
             Phase::ImplicitOnly => None,
-            Phase::WarmUp | Phase::Ramp | Phase::Joint => self.carry_tracked(batch, objective),
+            _ => self.carry_tracked(batch, objective),
         };
         Carried {
             positions: tracked.unwrap_or_else(|| Tensor::from_inner(still.clone())),

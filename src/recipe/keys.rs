@@ -14,8 +14,8 @@ use std::path::PathBuf;
 use super::rule::{Rule, Value};
 use super::schema::{Key, Section, Setting, sections};
 use super::words::{
-    Activation, Correspondences, Derivatives, Integrator, LevelSetForm, NormalSource, Preset,
-    Schedule, TimeSampling,
+    Activation, Correspondences, Derivatives, Integrator, LevelSetForm, MethodName, NormalSource,
+    Preset, Schedule, TimeSampling,
 };
 
 /// The most steps, points or files of any kind that a recipe may ask for.
@@ -53,6 +53,40 @@ sections! {
         /// Normals of the shapes: "auto" takes given ones and estimates missing ones. The paper
         /// calls them optional, but f fits forty times worse without.
         normals: NormalSource = "auto" | "auto" | "auto", Rule::word(NormalSource::WORDS);
+    }
+
+    /// What is trained: our method, or one that it is compared with (model/src/baseline).
+    method: MethodRecipe {
+        /// "velocity-field" is the paper's and ours, which differ in the values below.
+        name: MethodName = "velocity-field" | "velocity-field" | "velocity-field",
+            Rule::word(MethodName::WORDS);
+        /// Until here only the two end fields train; "nise" and "nise-velocity".
+        ends_until: f64 = 0.4 | 0.4 | 0.4, Rule::above_zero(0.9).unit("share of the steps");
+        /// Frequency of the sine networks of "nise" and "nise-velocity", which print 20 to 30.
+        omega: f64 = 20 | 20 | 20, Rule::above_zero(1000.0);
+        /// Weight of the difference from the end fields at t = 0 and t = 1; "nise".
+        ends: f64 = 10_000 | 10_000 | 10_000,
+            Rule::positive_or_zero().zero("frees f from its ends");
+        /// Weight of the residual of the equation between them; "nise".
+        residual: f64 = 10 | 10 | 10, Rule::positive_or_zero().zero("turns it off");
+        /// Weight of the bound on the Lipschitz constant; "lipmlp".
+        lipschitz: f64 = 1e-6 | 1e-6 | 1e-6, Rule::positive_or_zero().zero("turns it off");
+        /// Factor on space before the network, so that the bound acts on time; "lipmlp".
+        space_scale: f64 = 100 | 100 | 100, Rule::above_zero(1e6);
+        /// Sine modes along each axis; "eigenbasis".
+        modes: usize = 6 | 6 | 6, Rule::whole(1, 16);
+        /// Weight of the prior that keeps the modes small, higher ones more; "eigenbasis".
+        prior: f64 = 0.01 | 0.01 | 0.01, Rule::positive_or_zero().zero("turns it off");
+        /// Times at which a deformation is fitted, each with its share of the steps; "nfgp".
+        deformations: usize = 8 | 8 | 8, Rule::whole(1, 1000);
+        /// Residual blocks of a deformation; "nfgp".
+        blocks: usize = 6 | 6 | 6, Rule::whole(1, 32);
+        /// Weight of the distance of the handles from their marks; "nfgp".
+        handles: f64 = 100 | 100 | 100, Rule::positive_or_zero().zero("turns it off");
+        /// Weight of the change of lengths on the surface; "nfgp".
+        stretch: f64 = 0.1 | 0.1 | 0.1, Rule::positive_or_zero().zero("turns it off");
+        /// Weight of the change of curvature; "nfgp".
+        bend: f64 = 1e-3 | 1e-3 | 1e-3, Rule::positive_or_zero().zero("turns it off");
     }
 
     /// The network f(x, t), whose zero set at time t is the surface.

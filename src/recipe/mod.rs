@@ -32,12 +32,12 @@ use std::path::Path;
 
 pub use error::RecipeError;
 pub use keys::{
-    CheckpointRecipe, DataRecipe, ImplicitRecipe, LossRecipe, Recipe, ResultRecipe, TrainingRecipe,
-    VelocityRecipe,
+    CheckpointRecipe, DataRecipe, ImplicitRecipe, LossRecipe, MethodRecipe, Recipe, ResultRecipe,
+    TrainingRecipe, VelocityRecipe,
 };
 pub use words::{
-    Activation, Correspondences, Derivatives, Integrator, LevelSetForm, NormalSource, Preset,
-    Schedule, TimeSampling,
+    Activation, Correspondences, Derivatives, Integrator, LevelSetForm, MethodName, NormalSource,
+    Preset, Schedule, TimeSampling,
 };
 
 use keys::KEYS;
@@ -173,7 +173,7 @@ impl Change {
     /// Whether the key describes a network, so that checkpoints of the first recipe do not fit
     /// the second.
     pub fn is_of_a_network(&self) -> bool {
-        matches!(self.section, "implicit" | "velocity")
+        matches!(self.section, "method" | "implicit" | "velocity")
     }
 }
 

@@ -64,6 +64,26 @@ words! {
         Paper = "paper",
     }
 
+    /// What is trained.
+    MethodName {
+        /// `f(x, t)` carried by `V`: the paper's method and ours.
+        VelocityField = "velocity-field",
+        /// `f(x, t)` fitted at t = 0 and t = 1 only.
+        Mlp = "mlp",
+        /// `(1 - t) g + t h` of the two distance fields.
+        SdfBlend = "sdf-blend",
+        /// `f(x, t)` with a small Lipschitz constant (Liu et al. 2022).
+        Lipmlp = "lipmlp",
+        /// `f(x, t)` under a level-set equation between its ends (Novello et al. 2023).
+        Nise = "nise",
+        /// The same with an interpolated velocity.
+        NiseVelocity = "nise-velocity",
+        /// A divergence-free flow in a sine basis (Eisenberger et al. 2019).
+        Eigenbasis = "eigenbasis",
+        /// Invertible deformations, one per time (Yang et al. 2021).
+        Nfgp = "nfgp",
+    }
+
     /// Where the normals of the shapes come from.
     NormalSource {
         /// Those given with a shape, else estimated ones.

@@ -87,8 +87,7 @@ fn started(event: &Event) -> Option<String> {
         device,
         steps,
         first_step,
-        implicit_parameters,
-        velocity_parameters,
+        networks,
         source_points,
         target_points,
         correspondences,
@@ -100,10 +99,13 @@ fn started(event: &Event) -> Option<String> {
         0 => format!("{} on", counted(*steps, "step")),
         _ => format!("going on after step {first_step} of {steps} on"),
     };
+    let networks: Vec<String> = networks
+        .iter()
+        .map(|(name, weights)| format!("{name} has {}", counted(*weights, "weight")))
+        .collect();
     Some(format!(
-        "{begun} {backend} ({device}): f has {}, V has {}; {} on the source, {} on the target, {}",
-        counted(*implicit_parameters, "weight"),
-        HumanCount(*velocity_parameters as u64),
+        "{begun} {backend} ({device}): {}; {} on the source, {} on the target, {}",
+        networks.join(", "),
         counted(*source_points, "point"),
         HumanCount(*target_points as u64),
         counted(*correspondences, "correspondence"),

@@ -68,16 +68,15 @@ fn the_start_says_what_is_trained_on_what() {
         device: "Cpu".into(),
         steps: 4000,
         first_step,
-        implicit_parameters: 66_433,
-        velocity_parameters: 28_035,
+        networks: vec![("f", 66_433), ("V", 28_035)],
         source_points: 20_000,
         target_points: 20_000,
         correspondences: 1,
     };
     assert_eq!(
         text(started(0)),
-        "4,000 steps on ndarray (Cpu): f has 66,433 weights, V has 28,035; 20,000 points on the \
-         source, 20,000 on the target, 1 correspondence"
+        "4,000 steps on ndarray (Cpu): f has 66,433 weights, V has 28,035 weights; 20,000 points \
+         on the source, 20,000 on the target, 1 correspondence"
     );
     assert!(text(started(500)).starts_with("going on after step 500 of 4000 on ndarray (Cpu): f"));
 }

@@ -3,6 +3,7 @@
 //! Extraction keeps every piece; a filter is the user's choice.
 
 use super::SurfaceMesh;
+use crate::shape::connected::Connected;
 
 /// A connected piece of a mesh.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,15 +18,12 @@ impl SurfaceMesh {
     /// The connected pieces, largest area first; triangles that share a vertex are connected.
     #[must_use]
     pub fn components(&self) -> Vec<Component> {
-        let mut parents: Vec<u32> = (0..self.vertices.len() as u32).collect();
-        for &[a, b, c] in &self.triangles {
-            join(&mut parents, a, b);
-            join(&mut parents, a, c);
-        }
+        let each_alone = (0..self.vertices.len() as u32).collect();
+        let mut sets = Connected::new(each_alone, &self.triangles);
         let mut piece_of_root = vec![None; self.vertices.len()];
         let mut pieces: Vec<Component> = Vec::new();
         for (i, &triangle) in self.triangles.iter().enumerate() {
-            let root = root(&mut parents, triangle[0]) as usize;
+            let root = sets.root(triangle[0]) as usize;
             let piece = *piece_of_root[root].get_or_insert_with(|| {
                 pieces.push(Component {
                     triangles: Vec::new(),
@@ -85,21 +83,6 @@ impl SurfaceMesh {
             normals: self.normals.as_ref().map(pick),
         }
     }
-}
-
-/// The vertex that stands for the piece of `vertex`; shortens the way there for the next time.
-fn root(parents: &mut [u32], mut vertex: u32) -> u32 {
-    while parents[vertex as usize] != vertex {
-        let above = parents[parents[vertex as usize] as usize];
-        parents[vertex as usize] = above;
-        vertex = above;
-    }
-    vertex
-}
-
-fn join(parents: &mut [u32], a: u32, b: u32) {
-    let (a, b) = (root(parents, a), root(parents, b));
-    parents[a.max(b) as usize] = a.min(b);
 }
 
 #[cfg(test)]

@@ -9,9 +9,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use burn::tensor::{Tensor, backend::Backend};
-use isomorph_model::operators::{Derivatives, Operators};
-use isomorph_model::trajectory::{Integrator, Steps, integrate};
-use isomorph_model::{ImplicitNet, ModelBackend, VelocityNet};
+use isomorph_model::operators::length;
+use isomorph_model::{Geometry, ModelBackend, Motion};
 use serde::{Deserialize, Serialize};
 
 use super::SurfaceMesh;
@@ -25,22 +24,26 @@ use crate::tensors::rows;
 /// Points per evaluation of a network: enough to fill two cores, small enough to stay in their caches.
 const CHUNK: usize = 8192;
 
-/// Steps of the Runge-Kutta integrator per unit of time by which vertices are carried.
-const CARRY_STEPS: f64 = 32.0;
-
-/// A trained pair of networks and the frame that they live in.
-#[derive(Clone, Debug)]
+/// What was trained and the frame that it lives in.
 pub struct Trained<B: Backend> {
-    /// The Implicit-Net.
-    pub implicit: ImplicitNet<B>,
-    /// The Velocity-Net.
-    pub velocity: VelocityNet<B>,
+    /// What gives the surface.
+    pub shape: Surface<B>,
+    /// What moves points, if the method has it.
+    pub motion: Option<Box<dyn Motion<B>>>,
     /// From the user's coordinates to the networks'.
     pub normalisation: Normalisation,
     /// The box in which the surface is looked for, normalised.
     pub bounds: Bounds,
     /// Where tensors live.
     pub device: B::Device,
+}
+
+/// Where the surface of a time comes from.
+pub enum Surface<B: Backend> {
+    /// The zero set of a field.
+    Field(Box<dyn Geometry<B>>),
+    /// A mesh at time 0, normalised, that the motion carries: of methods that have no field.
+    Template(SurfaceMesh),
 }
 
 /// What to write.
@@ -67,9 +70,10 @@ pub struct FrameEntry {
     pub time: f64,
     /// The surface's file, relative to `frames.json`.
     pub surface: String,
-    /// The mean of `||grad f| - 1|` over the surface's vertices: how far f is from a distance there.
-    #[serde(default)]
-    pub slope_error: f64,
+    /// The mean of `||grad f| - 1|` over the surface's vertices: how far f is from a distance there;
+    /// none where the surface is not the zero set of a field.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub slope_error: Option<f64>,
     /// The carried mesh's file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub carried: Option<String>,
@@ -106,6 +110,9 @@ pub enum FramesError {
     /// The grid cannot be made.
     #[error(transparent)]
     Grid(#[from] GridError),
+    /// Nothing moves points.
+    #[error("{0}")]
+    NoMotion(String),
     /// No surface at a time.
     #[error("time {time}: {reason}")]
     Extract {
@@ -192,11 +199,15 @@ fn write_frame<B: ModelBackend>(
 ) -> Result<Frame, FramesError> {
     let time = options.times[k];
     let surface = format!("surface-{k:03}.{}", options.format.extension());
-    let (mut mesh, touches_box, evaluated) = surface_at(trained, grid, time)?;
+    let Found {
+        mut mesh,
+        touches_box,
+        evaluated,
+    } = trained.surface_at(grid, time)?;
     if options.smallest_component > 0.0 {
         mesh = mesh.keep_at_least(options.smallest_component);
     }
-    let (normals, slope_error) = normals(trained, &mesh.vertices, time);
+    let (normals, slope_error) = trained.normals(&mesh, time);
     let vertices = mesh
         .vertices
         .iter()
@@ -223,43 +234,111 @@ fn write_frame<B: ModelBackend>(
     })
 }
 
-/// The zero set at a time, whether it touches the box, and the share of the grid that was evaluated.
-fn surface_at<B: ModelBackend>(
-    trained: &Trained<B>,
-    grid: &Grid,
-    time: f64,
-) -> Result<(SurfaceMesh, bool, f64), FramesError> {
-    let field = |points: &[[f32; 3]]| {
-        let values = in_chunks(points, &trained.device, |x| {
-            let t = Tensor::full([x.dims()[0], 1], time, &trained.device);
-            trained.implicit.forward(x, t)
-        });
-        Ok::<_, Infallible>(values)
-    };
-    let found = extract(field, grid).map_err(|reason| FramesError::Extract { time, reason })?;
-    let share = found.evaluated as f64 / found.grid_points as f64;
-    Ok((found.mesh, found.touches_box, share))
+/// A surface found at a time.
+#[derive(Clone, Debug)]
+pub struct Found {
+    /// In normalised coordinates.
+    pub mesh: SurfaceMesh,
+    /// Whether the box cuts it off.
+    pub touches_box: bool,
+    /// The share of the grid's nodes at which the field was evaluated.
+    pub evaluated: f64,
 }
 
-/// Unit normals `grad f / |grad f|` at points of the surface, and the mean of `||grad f| - 1|` there.
-fn normals<B: ModelBackend>(
-    trained: &Trained<B>,
-    points: &[[f32; 3]],
-    time: f64,
-) -> (Vec<[f32; 3]>, f64) {
-    let flat = in_chunks(points, &trained.device, |x| {
-        let t = Tensor::full([x.dims()[0], 1], time, &trained.device);
-        // The written-out reverse sweep: on a backend without autodiff it is the only way, and exact.
-        let jet = Derivatives::Forward.implicit_jet(&trained.implicit, x, t);
-        Tensor::cat(vec![jet.normal(), jet.slope()], 1)
-    });
-    let rows = flat.as_chunks::<4>().0;
-    let off: f64 = rows
-        .iter()
-        .map(|[_, _, _, slope]| (f64::from(*slope) - 1.0).abs())
-        .sum();
-    let normals = rows.iter().map(|[x, y, z, _]| [*x, *y, *z]).collect();
-    (normals, off / rows.len().max(1) as f64)
+impl<B: ModelBackend> Trained<B> {
+    /// The surface at a time.
+    ///
+    /// # Errors
+    /// [`FramesError`] if the field is not finite there, or has too many cells; [`FramesError::NoMotion`].
+    pub fn surface_at(&self, grid: &Grid, time: f64) -> Result<Found, FramesError> {
+        let geometry = match &self.shape {
+            Surface::Field(geometry) => geometry,
+            Surface::Template(mesh) => {
+                let mut mesh = mesh.clone();
+                mesh.vertices = self.path(&mesh.vertices, &[time])?.remove(0);
+                return Ok(Found {
+                    mesh,
+                    touches_box: false,
+                    evaluated: 0.0,
+                });
+            }
+        };
+        let field = |points: &[[f32; 3]]| {
+            let values = in_chunks(points, &self.device, |x| {
+                let t = Tensor::full([x.dims()[0], 1], time, &self.device);
+                geometry.value(x, t)
+            });
+            Ok::<_, Infallible>(values)
+        };
+        let found = extract(field, grid).map_err(|reason| FramesError::Extract { time, reason })?;
+        Ok(Found {
+            mesh: found.mesh,
+            touches_box: found.touches_box,
+            evaluated: found.evaluated as f64 / found.grid_points as f64,
+        })
+    }
+
+    /// Unit normals of a surface, and the mean of `||grad f| - 1|` over its vertices where it is the zero
+    /// set of a field `f`.
+    fn normals(&self, mesh: &SurfaceMesh, time: f64) -> (Vec<[f32; 3]>, Option<f64>) {
+        let Some(gradients) = self.gradients(&mesh.vertices, time) else {
+            return (mesh.area_weighted_normals(), None);
+        };
+        let mut normals = Vec::with_capacity(gradients.len());
+        let mut off = 0.0;
+        for [x, y, z, slope] in &gradients {
+            normals.push([x / slope, y / slope, z / slope]);
+            off += (f64::from(*slope) - 1.0).abs();
+        }
+        (normals, Some(off / gradients.len().max(1) as f64))
+    }
+
+    /// The mean of `||grad f| - 1|` at points, normalised; `None` without a field.
+    pub fn slope_error(&self, points: &[[f32; 3]], time: f64) -> Option<f64> {
+        let gradients = self.gradients(points, time)?;
+        let off: f64 = gradients
+            .iter()
+            .map(|[_, _, _, slope]| (f64::from(*slope) - 1.0).abs())
+            .sum();
+        Some(off / gradients.len().max(1) as f64)
+    }
+
+    /// `grad f` and its length at points.
+    fn gradients(&self, points: &[[f32; 3]], time: f64) -> Option<Vec<[f32; 4]>> {
+        let Surface::Field(geometry) = &self.shape else {
+            return None;
+        };
+        let flat = in_chunks(points, &self.device, |x| {
+            let t = Tensor::full([x.dims()[0], 1], time, &self.device);
+            let gradient = geometry.gradient(x, t);
+            Tensor::cat(vec![gradient.clone(), length(gradient)], 1)
+        });
+        Some(flat.as_chunks::<4>().0.to_vec())
+    }
+
+    /// Positions at ascending times of points that are at `start` at time 0, normalised.
+    ///
+    /// # Errors
+    /// [`FramesError::NoMotion`] if the method moves no points.
+    pub fn path(
+        &self,
+        start: &[[f32; 3]],
+        times: &[f64],
+    ) -> Result<Vec<Vec<[f32; 3]>>, FramesError> {
+        let motion = self.motion.as_ref().ok_or_else(|| {
+            let text = "this method gives a surface and moves no points: leave --carry out";
+            FramesError::NoMotion(text.to_owned())
+        })?;
+        let mut path = vec![Vec::with_capacity(start.len()); times.len()];
+        for chunk in start.chunks(CHUNK) {
+            let positions = motion.path(rows(chunk, &self.device), times);
+            for (whole, part) in path.iter_mut().zip(positions) {
+                let flat: Vec<f32> = part.into_data().iter::<f32>().collect();
+                whole.extend_from_slice(flat.as_chunks::<3>().0);
+            }
+        }
+        Ok(path)
+    }
 }
 
 /// Carries the vertices of a shape through all times and writes a file for each; their names.
@@ -281,11 +360,9 @@ fn carry<B: ModelBackend>(
     let mut order: Vec<usize> = (0..options.times.len()).collect();
     order.sort_by(|a, b| options.times[*a].total_cmp(&options.times[*b]));
     let mut names = vec![None; options.times.len()];
-    let (mut now, mut at) = (start.clone(), 0.0);
-    for k in order {
-        let time = options.times[k];
-        now = carried_on(trained, &now, at, time);
-        at = time;
+    let times: Vec<f64> = order.iter().map(|k| options.times[*k]).collect();
+    let path = trained.path(&start, &times)?;
+    for (k, now) in order.into_iter().zip(path) {
         // The displacement is added to the vertex as it was read, so that time 0 gives the input back.
         let moved: Vec<[f64; 3]> = (shape.vertices.iter().zip(&start).zip(&now))
             .map(|((vertex, start), now)| {
@@ -300,32 +377,6 @@ fn carry<B: ModelBackend>(
         names[k] = Some(name);
     }
     Ok(names)
-}
-
-/// Positions at time `to` of points that are at `x` at time `from`.
-pub fn carried_on<B: ModelBackend>(
-    trained: &Trained<B>,
-    x: &[[f32; 3]],
-    from: f64,
-    to: f64,
-) -> Vec<[f32; 3]> {
-    if from == to {
-        return x.to_vec();
-    }
-    let steps = Steps::Even(((to - from).abs() * CARRY_STEPS).ceil() as usize);
-    let flat = in_chunks(x, &trained.device, |x| {
-        let full = |time: f64| Tensor::full([x.dims()[0], 1], time, &trained.device);
-        let (from, to) = (full(from), full(to));
-        integrate(
-            |x, t| trained.velocity.forward(x, t),
-            x,
-            from,
-            to,
-            steps,
-            Integrator::Rk4,
-        )
-    });
-    flat.as_chunks::<3>().0.to_vec()
 }
 
 /// Evaluates `map` on points, a chunk at a time, and reads the results back.

@@ -8,6 +8,19 @@ use crate::recipe::rule::Kind;
 const ENDS: &str = r#"
 data.points                    64      63       10000000 10000001
 data.correspondence-fraction   1e-9    0        1        1.001
+method.ends-until              1e-9    0        0.9      0.91
+method.omega                   1e-9    0        1000     1000.1
+method.ends                    0       -1e-9    3e38     inf
+method.residual                0       -1e-9    3e38     inf
+method.lipschitz               0       -1e-9    3e38     inf
+method.space-scale             1e-9    0        1000000  1000001
+method.modes                   1       0        16       17
+method.prior                   0       -1e-9    3e38     inf
+method.deformations            1       0        1000     1001
+method.blocks                  1       0        32       33
+method.handles                 0       -1e-9    3e38     inf
+method.stretch                 0       -1e-9    3e38     inf
+method.bend                    0       -1e-9    3e38     inf
 implicit.depth                 1       0        32       33
 implicit.width                 4       3        4096     4097
 implicit.beta                  1e-9    0        1000     1000.1
@@ -112,6 +125,10 @@ fn every_word_is_admitted_and_no_other() {
     let words = [
         ("data.normals", "auto given estimate none"),
         ("data.correspondences", "none same-vertices pairs.csv"),
+        (
+            "method.name",
+            "velocity-field mlp sdf-blend lipmlp nise nise-velocity eigenbasis nfgp",
+        ),
         ("implicit.activation", "softplus sine"),
         ("velocity.activation", "softplus sine"),
         ("velocity.time-dependent", "true false"),

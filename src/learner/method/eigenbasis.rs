@@ -1,0 +1,106 @@
+//! `eigenbasis`: a divergence-free flow in a sine basis, fitted to the correspondences. It moves points and
+//! has no field: its surface is the source's mesh, carried.
+
+use std::io;
+
+use burn::module::Module;
+use isomorph_model::baseline::eigenbasis::{Eigenbasis, EigenbasisConfig, EigenbasisWeights};
+use isomorph_model::trajectory::{Integrator, Steps};
+use isomorph_model::{Geometry, Motion, Objective, TrainBackend};
+
+use super::{Method, Rates, Records, Trainee, TrainingData};
+use crate::learner::batch;
+use crate::learner::checkpoint::{Checkpoint, CheckpointError};
+use crate::learner::event::Phase;
+use crate::learner::schedule::Schedule;
+use crate::recipe::{Recipe, TrainingRecipe};
+use crate::shape::Bounds;
+use crate::tensors::rows;
+
+/// Steps of the integrator between two times: the field is fixed, and as smooth as its highest mode.
+const STEPS: Steps = Steps::Even(8);
+
+/// The box's padding, as a share of its longest side: no point crosses its walls.
+const PADDING: f64 = 0.15;
+
+/// The flow and how it is fitted.
+pub(super) struct Flow<B: TrainBackend> {
+    training: TrainingRecipe,
+    weights: EigenbasisWeights,
+    schedule: Schedule,
+    device: B::Device,
+    net: Trainee<B, Eigenbasis<B>>,
+}
+
+impl<B: TrainBackend> Flow<B> {
+    /// Before the first step.
+    pub(super) fn new(recipe: &Recipe, bounds: &Bounds, device: &B::Device) -> Self {
+        let config = EigenbasisConfig {
+            modes: recipe.method.modes,
+            lower: bounds.min.map(f64::from),
+            upper: bounds.max.map(f64::from),
+            padding: PADDING,
+            steps: STEPS,
+            integrator: Integrator::Midpoint,
+        };
+        Self {
+            schedule: Schedule::new(&recipe.training),
+            training: recipe.training.clone(),
+            weights: EigenbasisWeights {
+                matching: recipe.loss.matching,
+                robust_scale: recipe.loss.matching_scale,
+                prior: recipe.method.prior,
+            },
+            net: Trainee::new("velocity", config.init(device), device),
+            device: device.clone(),
+        }
+    }
+}
+
+impl<B: TrainBackend> Method<B> for Flow<B> {
+    fn phase(&self, _: usize) -> Phase {
+        Phase::Motion
+    }
+
+    fn rates(&self, step: usize) -> Rates {
+        let training = &self.training;
+        let first = training.velocity_learning_rate;
+        Rates {
+            implicit: 0.0,
+            velocity: self.schedule.rate(first, step, 0, training.steps),
+        }
+    }
+
+    fn objective(&self, data: &TrainingData, step: usize) -> Objective<B> {
+        let (from, to) = batch::draw_matched(&data.pair, &self.training, step);
+        let (x0, x1) = (rows(&from, &self.device), rows(&to, &self.device));
+        self.net.net.objective(x0, x1, &self.weights)
+    }
+
+    fn descend(&mut self, step: usize, gradients: &mut B::Gradients) {
+        let rate = self.rates(step).velocity;
+        self.net.advance(gradients, rate, self.training.clip);
+    }
+
+    fn networks(&self) -> Vec<(&'static str, usize)> {
+        vec![("V", self.net.net.num_params())]
+    }
+
+    fn records(&self) -> io::Result<Records> {
+        let mut records = Records::default();
+        self.net.record(&mut records)?;
+        Ok(records)
+    }
+
+    fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
+        self.net.restore(checkpoint)
+    }
+
+    fn geometry(&self) -> Option<Box<dyn Geometry<B::InnerBackend>>> {
+        None
+    }
+
+    fn motion(&self) -> Option<Box<dyn Motion<B::InnerBackend>>> {
+        Some(Box::new(self.net.valid()))
+    }
+}

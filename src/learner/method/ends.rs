@@ -1,0 +1,232 @@
+//! The methods that are fitted at t = 0 and t = 1 and left alone between: `mlp`, `sdf-blend`, `lipmlp`.
+
+use std::io;
+use std::ops::Range;
+
+use burn::module::AutodiffModule;
+use isomorph_model::baseline::blend::{SdfBlend, SdfBlendConfig};
+use isomorph_model::baseline::ends::{EndSamples, EndWeights};
+use isomorph_model::baseline::lipmlp::{LipMlp, LipMlpConfig};
+use isomorph_model::baseline::mlp::{PlainMlp, PlainMlpConfig};
+use isomorph_model::{Geometry, Motion, Objective, TrainBackend};
+
+use super::{Method, Rates, Records, Trainee, TrainingData};
+use crate::learner::batch::{self, EndBatch};
+use crate::learner::checkpoint::{Checkpoint, CheckpointError};
+use crate::learner::event::Phase;
+use crate::learner::schedule::Schedule;
+use crate::learner::settings::Settings;
+use crate::recipe::{LossRecipe, Recipe};
+use crate::tensors::{column, rows};
+
+/// A network that knows what its step at the ends minimises.
+pub(super) trait EndNet<B: TrainBackend>:
+    AutodiffModule<B, InnerModule: Geometry<B::InnerBackend> + 'static>
+{
+    /// The network as the recipe's seed makes it.
+    fn new(recipe: &Recipe, settings: &Settings, device: &B::Device) -> Self;
+
+    /// The terms at the samples of one step.
+    fn terms(&self, recipe: &Recipe, settings: &Settings, samples: &Drawn<B>) -> Objective<B>;
+
+    /// Whether it learns from signed distances.
+    const DISTANCES: bool = false;
+}
+
+/// One network fitted at both ends in every step.
+pub(super) struct EndFit<B: TrainBackend, M: EndNet<B>> {
+    recipe: Recipe,
+    settings: Settings,
+    schedule: Schedule,
+    device: B::Device,
+    net: Trainee<B, M>,
+}
+
+/// `mlp`.
+pub(super) type FitMlp<B> = EndFit<B, PlainMlp<B>>;
+/// `sdf-blend`.
+pub(super) type FitBlend<B> = EndFit<B, SdfBlend<B>>;
+/// `lipmlp`.
+pub(super) type FitLipMlp<B> = EndFit<B, LipMlp<B>>;
+
+impl<B: TrainBackend, M: EndNet<B>> EndFit<B, M> {
+    /// Before the first step.
+    pub(super) fn new(recipe: &Recipe, device: &B::Device) -> Self {
+        let settings = Settings::new(recipe);
+        let net = M::new(recipe, &settings, device);
+        Self {
+            recipe: recipe.clone(),
+            schedule: Schedule::new(&settings.training),
+            net: Trainee::new("implicit", net, device),
+            device: device.clone(),
+            settings,
+        }
+    }
+}
+
+impl<B: TrainBackend, M: EndNet<B>> Method<B> for EndFit<B, M> {
+    fn phase(&self, _: usize) -> Phase {
+        Phase::Ends
+    }
+
+    fn rates(&self, step: usize) -> Rates {
+        let training = &self.settings.training;
+        let implicit = self
+            .schedule
+            .rate(training.learning_rate, step, 0, training.steps);
+        Rates {
+            implicit,
+            velocity: 0.0,
+        }
+    }
+
+    fn objective(&self, data: &TrainingData, step: usize) -> Objective<B> {
+        let drawn = Drawn::new(data, &self.settings, step, M::DISTANCES, &self.device);
+        self.net.net.terms(&self.recipe, &self.settings, &drawn)
+    }
+
+    fn descend(&mut self, step: usize, gradients: &mut B::Gradients) {
+        let rate = self.rates(step).implicit;
+        self.net
+            .advance(gradients, rate, self.settings.training.clip);
+    }
+
+    fn networks(&self) -> Vec<(&'static str, usize)> {
+        vec![("f", self.net.net.num_params())]
+    }
+
+    fn records(&self) -> io::Result<Records> {
+        let mut records = Records::default();
+        self.net.record(&mut records)?;
+        Ok(records)
+    }
+
+    fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
+        self.net.restore(checkpoint)
+    }
+
+    fn geometry(&self) -> Option<Box<dyn Geometry<B::InnerBackend>>> {
+        Some(Box::new(self.net.valid()))
+    }
+
+    fn motion(&self) -> Option<Box<dyn Motion<B::InnerBackend>>> {
+        None
+    }
+}
+
+impl<B: TrainBackend> EndNet<B> for PlainMlp<B> {
+    fn new(_: &Recipe, settings: &Settings, device: &B::Device) -> Self {
+        let implicit = settings.implicit;
+        PlainMlpConfig { implicit }.init(settings.training.seed, device)
+    }
+
+    fn terms(&self, _: &Recipe, settings: &Settings, drawn: &Drawn<B>) -> Objective<B> {
+        let weights = end_weights(&settings.loss);
+        self.objective(&drawn.both(), &weights, &settings.derivatives)
+    }
+}
+
+impl<B: TrainBackend> EndNet<B> for SdfBlend<B> {
+    fn new(_: &Recipe, settings: &Settings, device: &B::Device) -> Self {
+        let implicit = settings.implicit;
+        SdfBlendConfig { implicit }.init(settings.training.seed, device)
+    }
+
+    fn terms(&self, _: &Recipe, settings: &Settings, drawn: &Drawn<B>) -> Objective<B> {
+        let weights = end_weights(&settings.loss);
+        let [source, target] = drawn.apart();
+        self.objective([&source, &target], &weights, &settings.derivatives)
+    }
+}
+
+impl<B: TrainBackend> EndNet<B> for LipMlp<B> {
+    fn new(recipe: &Recipe, settings: &Settings, device: &B::Device) -> Self {
+        let config = LipMlpConfig {
+            depth: settings.implicit.depth,
+            width: settings.implicit.width,
+            space_scale: recipe.method.space_scale,
+        };
+        config.init(settings.training.seed, device)
+    }
+
+    fn terms(&self, recipe: &Recipe, _: &Settings, drawn: &Drawn<B>) -> Objective<B> {
+        self.objective(&drawn.both(), recipe.method.lipschitz)
+    }
+
+    const DISTANCES: bool = true;
+}
+
+/// The weights of the terms at the ends.
+pub(super) fn end_weights(loss: &LossRecipe) -> EndWeights {
+    EndWeights {
+        // As in our own method: the paper adds the means over the two shapes, and this is their mean.
+        data: 2.0 * loss.data,
+        normals: loss.normals,
+        eikonal: loss.eikonal,
+        off_surface: loss.off_surface,
+    }
+}
+
+/// The samples of a step, on the host, and what they become on the device.
+pub(super) struct Drawn<B: TrainBackend> {
+    pub batch: EndBatch,
+    /// Signed distances of the points in space from the shape of their end, or none.
+    distances: Vec<f32>,
+    device: B::Device,
+}
+
+impl<B: TrainBackend> Drawn<B> {
+    pub(super) fn new(
+        data: &TrainingData,
+        settings: &Settings,
+        step: usize,
+        distances: bool,
+        device: &B::Device,
+    ) -> Self {
+        let batch = batch::draw_ends(&data.pair, &settings.training, step);
+        let known = if distances { data.distances() } else { None };
+        let distances = known.map_or_else(Vec::new, |known| {
+            let points = batch.space.points.iter().zip(&batch.space.times);
+            points
+                .map(|(x, t)| known[usize::from(*t > 0.5)].at(*x))
+                .collect()
+        });
+        Self {
+            batch,
+            distances,
+            device: device.clone(),
+        }
+    }
+
+    /// Both ends together.
+    pub(super) fn both(&self) -> EndSamples<B> {
+        let (surface, space) = (&self.batch.surface.points, &self.batch.space.points);
+        self.samples(0..surface.len(), 0..space.len())
+    }
+
+    /// The source's and the target's.
+    pub(super) fn apart(&self) -> [EndSamples<B>; 2] {
+        let (n, m) = (
+            self.batch.surface.points.len(),
+            self.batch.space.points.len(),
+        );
+        [
+            self.samples(0..n / 2, 0..m / 2),
+            self.samples(n / 2..n, m / 2..m),
+        ]
+    }
+
+    fn samples(&self, on: Range<usize>, off: Range<usize>) -> EndSamples<B> {
+        let (surface, space) = (&self.batch.surface, &self.batch.space);
+        let known = surface.normals.len() == surface.points.len();
+        let measured = !self.distances.is_empty();
+        EndSamples {
+            surface: rows(&surface.points[on.clone()], &self.device),
+            surface_times: column(&surface.times[on.clone()], &self.device),
+            normals: known.then(|| rows(&surface.normals[on], &self.device)),
+            space: rows(&space.points[off.clone()], &self.device),
+            space_times: column(&space.times[off.clone()], &self.device),
+            distances: measured.then(|| column(&self.distances[off], &self.device)),
+        }
+    }
+}

@@ -1,0 +1,144 @@
+//! `nfgp`: one invertible deformation per time, each with its share of the steps, started from the one
+//! before. The handles are the correspondences, sent along straight lines to that time.
+
+use std::io;
+
+use burn::module::Module;
+use isomorph_model::baseline::nfgp::{
+    FixedPoint, Nfgp, NfgpConfig, NfgpMotion, NfgpMotionConfig, NfgpSamples, NfgpWeights,
+};
+use isomorph_model::{Geometry, Motion, Objective, TrainBackend};
+
+use super::{Method, Rates, Records, Trainee, TrainingData};
+use crate::learner::batch;
+use crate::learner::checkpoint::{Checkpoint, CheckpointError};
+use crate::learner::event::Phase;
+use crate::learner::schedule::Schedule;
+use crate::recipe::{Recipe, TrainingRecipe};
+use crate::tensors::rows;
+
+/// The deformations and the one in work.
+pub(super) struct Deformations<B: TrainBackend> {
+    training: TrainingRecipe,
+    weights: NfgpWeights,
+    schedule: Schedule,
+    device: B::Device,
+    /// All of them, the one in work as it stands.
+    done: Trainee<B, NfgpMotion<B>>,
+    /// The one in work.
+    work: Trainee<B, Nfgp<B>>,
+}
+
+impl<B: TrainBackend> Deformations<B> {
+    /// Before the first step.
+    pub(super) fn new(recipe: &Recipe, device: &B::Device) -> Self {
+        let config = NfgpMotionConfig {
+            deformation: NfgpConfig {
+                blocks: recipe.method.blocks,
+                width: recipe.implicit.width,
+                ..NfgpConfig::default()
+            },
+            times: recipe.method.deformations,
+            inverse: FixedPoint::default(),
+        };
+        let motion: NfgpMotion<B> = config.init(recipe.training.seed, device);
+        Self {
+            schedule: Schedule::new(&recipe.training),
+            training: recipe.training.clone(),
+            weights: NfgpWeights {
+                handles: recipe.method.handles,
+                stretch: recipe.method.stretch,
+                bend: recipe.method.bend,
+            },
+            work: Trainee::new("deformation", motion.start(0), device),
+            done: Trainee::new("deformations", motion, device),
+            device: device.clone(),
+        }
+    }
+
+    /// The deformation that a step trains, counted from 0, and its first step and the one after its last.
+    fn turn(&self, step: usize) -> (usize, usize, usize) {
+        let (times, steps) = (self.done.net.times(), self.training.steps);
+        let first = |index: usize| index * steps / times;
+        let index = (0..times)
+            .rev()
+            .find(|index| first(*index) <= step)
+            .unwrap_or(0);
+        (index, first(index), first(index + 1))
+    }
+}
+
+impl<B: TrainBackend> Method<B> for Deformations<B> {
+    fn phase(&self, _: usize) -> Phase {
+        Phase::Motion
+    }
+
+    fn rates(&self, step: usize) -> Rates {
+        let (_, from, until) = self.turn(step);
+        let first = self.training.velocity_learning_rate;
+        Rates {
+            implicit: 0.0,
+            velocity: self.schedule.rate(first, step, from, until),
+        }
+    }
+
+    fn objective(&self, data: &TrainingData, step: usize) -> Objective<B> {
+        let (index, ..) = self.turn(step);
+        let time = self.done.net.time(index) as f32;
+        let (handles, ends) = batch::draw_matched(&data.pair, &self.training, step);
+        let marks: Vec<[f32; 3]> = (handles.iter().zip(&ends))
+            .map(|(x0, x1)| std::array::from_fn(|axis| x0[axis] + time * (x1[axis] - x0[axis])))
+            .collect();
+        let drawn = batch::draw_neighbours(
+            &data.pair.source,
+            data.source_search(),
+            &self.training,
+            step,
+        );
+        let tensor = |points: &[[f32; 3]]| rows(points, &self.device);
+        let samples = NfgpSamples {
+            handles: tensor(&handles),
+            marks: tensor(&marks),
+            points: tensor(&drawn.points),
+            normals: tensor(&drawn.normals),
+            neighbours: tensor(&drawn.neighbours),
+            neighbour_normals: tensor(&drawn.neighbour_normals),
+        };
+        self.work.net.objective(&samples, &self.weights)
+    }
+
+    fn descend(&mut self, step: usize, gradients: &mut B::Gradients) {
+        let rate = self.rates(step).velocity;
+        self.work.advance(gradients, rate, self.training.clip);
+        let (index, _, until) = self.turn(step);
+        self.done.net.replace(index, &self.work.net);
+        if step + 1 == until && index + 1 < self.done.net.times() {
+            let next = self.done.net.start(index + 1);
+            self.work = Trainee::new("deformation", next, &self.device);
+        }
+    }
+
+    fn networks(&self) -> Vec<(&'static str, usize)> {
+        vec![("D", self.done.net.num_params())]
+    }
+
+    fn records(&self) -> io::Result<Records> {
+        let mut records = Records::default();
+        self.work.record(&mut records)?;
+        self.done.record(&mut records)?;
+        Ok(records)
+    }
+
+    fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
+        self.work.restore(checkpoint)?;
+        self.done.restore(checkpoint)
+    }
+
+    fn geometry(&self) -> Option<Box<dyn Geometry<B::InnerBackend>>> {
+        None
+    }
+
+    fn motion(&self) -> Option<Box<dyn Motion<B::InnerBackend>>> {
+        Some(Box::new(self.done.valid()))
+    }
+}

@@ -1,0 +1,107 @@
+//! `f(x, t)` carried by `V`, trained together: the paper's method and ours, which differ in weights,
+//! sampling and terms only (`recipe/keys.rs`, the columns of the presets).
+
+use std::io;
+
+use burn::module::Module;
+use isomorph_model::{Geometry, ImplicitNet, Motion, Objective, TrainBackend, VelocityNet};
+
+use super::{Method, Rates, Records, Trainee, TrainingData};
+use crate::learner::batch::{self, BatchSizes};
+use crate::learner::checkpoint::{Checkpoint, CheckpointError};
+use crate::learner::event::Phase;
+use crate::learner::schedule::Schedule;
+use crate::learner::settings::Settings;
+use crate::learner::step::Step;
+use crate::recipe::Recipe;
+
+/// The two networks and how they are trained.
+pub(super) struct VelocityField<B: TrainBackend> {
+    settings: Settings,
+    schedule: Schedule,
+    device: B::Device,
+    implicit: Trainee<B, ImplicitNet<B>>,
+    velocity: Trainee<B, VelocityNet<B>>,
+}
+
+impl<B: TrainBackend> VelocityField<B> {
+    /// Both networks as the recipe's seed makes them.
+    pub(super) fn new(recipe: &Recipe, device: &B::Device) -> Self {
+        let settings = Settings::new(recipe);
+        let seed = settings.training.seed;
+        let implicit = settings.implicit.init(seed, device);
+        let velocity = settings.velocity.init(seed.wrapping_add(1), device);
+        Self {
+            schedule: Schedule::new(&settings.training),
+            implicit: Trainee::new("implicit", implicit, device),
+            velocity: Trainee::new("velocity", velocity, device),
+            device: device.clone(),
+            settings,
+        }
+    }
+}
+
+impl<B: TrainBackend> Method<B> for VelocityField<B> {
+    fn phase(&self, step: usize) -> Phase {
+        self.schedule.phase(step)
+    }
+
+    fn rates(&self, step: usize) -> Rates {
+        Rates {
+            implicit: self.schedule.implicit_rate(step),
+            velocity: self.schedule.velocity_rate(step),
+        }
+    }
+
+    fn objective(&self, data: &TrainingData, step: usize) -> Objective<B> {
+        let training = &self.settings.training;
+        let sizes = BatchSizes::new(training, data.pair.correspondences.len());
+        let batch = batch::draw(&data.pair, training, sizes, step);
+        let step = Step {
+            settings: &self.settings,
+            sizes,
+            phase: self.schedule.phase(step),
+            ramp: self.schedule.ramp(step),
+            f: &self.implicit.net,
+            v: &self.velocity.net,
+            device: &self.device,
+        };
+        step.objective(&batch)
+    }
+
+    fn descend(&mut self, step: usize, gradients: &mut B::Gradients) {
+        let clip = self.settings.training.clip;
+        let (phase, rates) = (self.phase(step), self.rates(step));
+        if phase != Phase::WarmUp {
+            self.implicit.advance(gradients, rates.implicit, clip);
+        }
+        if phase != Phase::ImplicitOnly {
+            self.velocity.advance(gradients, rates.velocity, clip);
+        }
+    }
+
+    fn networks(&self) -> Vec<(&'static str, usize)> {
+        let (f, v) = (&self.implicit.net, &self.velocity.net);
+        vec![("f", f.num_params()), ("V", v.num_params())]
+    }
+
+    fn records(&self) -> io::Result<Records> {
+        let mut records = Records::default();
+        self.implicit.record(&mut records)?;
+        self.velocity.record(&mut records)?;
+        Ok(records)
+    }
+
+    fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
+        self.implicit.restore(checkpoint)?;
+        self.velocity.restore(checkpoint)
+    }
+
+    fn geometry(&self) -> Option<Box<dyn Geometry<B::InnerBackend>>> {
+        Some(Box::new(self.implicit.valid()))
+    }
+
+    fn motion(&self) -> Option<Box<dyn Motion<B::InnerBackend>>> {
+        Some(Box::new(self.velocity.valid()))
+    }
+}
