@@ -1,0 +1,135 @@
+//! A trained method as the evaluation asks for it, and how it is measured.
+
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use anyhow::Result;
+use indicatif::{ProgressBar, ProgressStyle};
+use isomorph_model::ModelBackend;
+
+use crate::evaluate::{Candidate, Carried, EvaluateError, Evaluation, Mesh, Purpose, Reference};
+use crate::shape::Normalisation;
+use crate::surface::extract::{Grid, GridError};
+use crate::surface::frames::{FramesError, Surface, Trained};
+
+/// Cells along the longest side where a surface only serves to find the best times.
+const COARSE: usize = 48;
+
+/// Where and how closely a method is measured.
+pub(super) struct Ruler<'a> {
+    /// The true frames.
+    pub reference: &'a Reference,
+    /// The coordinates of the true frames: those of the true ends, whatever the method was given.
+    pub normalisation: Normalisation,
+    /// Cells along the longest side of the box.
+    pub resolution: usize,
+    /// Set to stop.
+    pub stop: &'a AtomicBool,
+}
+
+/// A method with the grids on which its surfaces are found.
+struct Measured<'a, B: ModelBackend> {
+    trained: &'a Trained<B>,
+    truth: Normalisation,
+    fine: Grid,
+    coarse: Grid,
+}
+
+impl<'a, B: ModelBackend> Measured<'a, B> {
+    fn new(trained: &'a Trained<B>, ruler: &Ruler) -> Result<Self, GridError> {
+        let grid = |cells| Grid::new(trained.bounds.min, trained.bounds.max, cells);
+        Ok(Self {
+            trained,
+            truth: ruler.normalisation,
+            fine: grid(ruler.resolution)?,
+            coarse: grid(ruler.resolution.min(COARSE))?,
+        })
+    }
+
+    /// From the method's coordinates to those of the truth.
+    fn measured(&self, points: Vec<[f32; 3]>) -> Vec<[f32; 3]> {
+        between(&self.trained.normalisation, &self.truth, points)
+    }
+
+    /// From the coordinates of the truth to the method's.
+    fn learnt(&self, points: &[[f32; 3]]) -> Vec<[f32; 3]> {
+        between(&self.truth, &self.trained.normalisation, points.to_vec())
+    }
+}
+
+/// Points of one frame in another.
+fn between(from: &Normalisation, to: &Normalisation, points: Vec<[f32; 3]>) -> Vec<[f32; 3]> {
+    if from == to {
+        return points;
+    }
+    let points = points.into_iter();
+    points.map(|point| to.apply(from.invert(point))).collect()
+}
+
+impl<B: ModelBackend> Candidate for Measured<'_, B> {
+    type Error = FramesError;
+
+    /// The zero set of the method's field, where it is not empty; a method that only carries the source's
+    /// mesh has no surface beside that one.
+    fn surface(&mut self, time: f64, purpose: Purpose) -> Result<Option<Mesh>, FramesError> {
+        if matches!(self.trained.shape, Surface::Template(_)) {
+            return Ok(None);
+        }
+        let grid = match purpose {
+            Purpose::Aligning => &self.coarse,
+            Purpose::Measured => &self.fine,
+        };
+        let mesh = self.trained.surface_at(grid, time)?.mesh;
+        if mesh.triangles.is_empty() {
+            return Ok(None);
+        }
+        let vertices = self.measured(mesh.vertices);
+        Ok(Some(Mesh::of_points(&vertices, &mesh.triangles)))
+    }
+
+    fn carried(
+        &mut self,
+        start: &[[f32; 3]],
+        times: &[f64],
+    ) -> Result<Option<Carried>, FramesError> {
+        if self.trained.motion.is_none() {
+            return Ok(None);
+        }
+        let path = self.trained.path(&self.learnt(start), times)?;
+        Ok(Some(path.into_iter().map(|at| self.measured(at)).collect()))
+    }
+
+    fn slope_error(&mut self, points: &[[f32; 3]], time: f64) -> Result<Option<f64>, FramesError> {
+        Ok(self.trained.slope_error(&self.learnt(points), time))
+    }
+}
+
+/// Measures a method against a reference, with a bar on the terminal; `None` if it was stopped.
+///
+/// # Errors
+/// What keeps the method from being measured: a surface that is empty at some time, for one.
+pub(super) fn measure<B: ModelBackend>(
+    trained: &Trained<B>,
+    ruler: &Ruler,
+) -> Result<Option<Evaluation>> {
+    let mut measured = Measured::new(trained, ruler)?;
+    let bar = ProgressBar::new(ruler.reference.frames().len() as u64);
+    let style =
+        ProgressStyle::with_template("{pos:>4}/{len} [{bar:16}] {msg}, {elapsed}, {eta} left");
+    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    let result = ruler.reference.evaluate(&mut measured, |done, _| {
+        bar.set_message(if done == 0 { "aligning" } else { "measuring" });
+        bar.set_position(done as u64);
+        if ruler.stop.load(Ordering::Relaxed) {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    });
+    bar.finish_and_clear();
+    match result {
+        Ok(evaluation) => Ok(Some(evaluation)),
+        Err(EvaluateError::Stopped { .. }) => Ok(None),
+        Err(error) => Err(anyhow::anyhow!("{error}")),
+    }
+}

@@ -1,0 +1,324 @@
+//! The true frames: a sequence of one mesh, vertex by vertex, and the two frames that a run is
+//! given.
+
+use std::cmp::Ordering;
+use std::path::{Path, PathBuf};
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use super::TruthError;
+use crate::shape::{self, NeighbourSearch, Normalisation, Sequence, Shape, ShapeError};
+
+/// The ends and one frame in between.
+pub(super) const FEWEST_FRAMES: usize = 3;
+
+/// Farther than this on average, in normalised units, an end of a run is not the frame it is said
+/// to be. The samples of the same surface come out at 0.0016.
+pub(super) const SAME_SHAPE_WITHIN: f64 = 0.01;
+
+/// Samples of a frame that an end of a run is held against.
+const END_SAMPLES: usize = 100_000;
+
+/// Frames of one mesh in the user's coordinates; every frame has the same vertices in the same
+/// order.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GroundTruth {
+    path: PathBuf,
+    frames: Vec<Vec<[f64; 3]>>,
+    triangles: Vec<[u32; 3]>,
+}
+
+impl GroundTruth {
+    /// Reads a `.anime` sequence, or a folder whose PLY and OBJ meshes are the frames in the
+    /// natural order of their names: `frame-2` before `frame-10`. Other files in the folder are
+    /// passed over.
+    ///
+    /// # Errors
+    /// One line: a frame that cannot be read or has no triangles or no area, fewer than three
+    /// frames, two frames that differ in their number of vertices or in their triangles.
+    pub fn read(path: &Path) -> Result<Self, TruthError> {
+        if path.is_dir() {
+            return Self::read_folder(path);
+        }
+        let extension = path.extension().unwrap_or_default();
+        if !extension.eq_ignore_ascii_case("anime") {
+            return Err(match path.exists() {
+                true => TruthError::NoSequence { path: path.into() },
+                false => unreadable(path, std::io::ErrorKind::NotFound.into()),
+            });
+        }
+        let sequence = Sequence::read(path)?;
+        let vertices = |frame| Ok(sequence.shape(frame)?.vertices);
+        let frames = (0..sequence.frames.len()).map(vertices);
+        let frames = frames.collect::<Result<_, ShapeError>>()?;
+        Self::new(path.to_owned(), frames, sequence.triangles)
+    }
+
+    fn read_folder(folder: &Path) -> Result<Self, TruthError> {
+        let mut shapes = Vec::new();
+        for path in meshes_in(folder)? {
+            let shape = shape::read(&path)?;
+            if !shape.is_mesh() {
+                return Err(TruthError::Cloud { path });
+            }
+            if let Some(first) = shapes.first() {
+                consistent(first, &shape)?;
+            }
+            shapes.push(shape);
+        }
+        let triangles = shapes
+            .first()
+            .map_or_else(Vec::new, |first| first.triangles.clone());
+        let frames = shapes.into_iter().map(|shape| shape.vertices).collect();
+        Self::new(folder.to_owned(), frames, triangles)
+    }
+
+    /// Frames that are known to be of one mesh.
+    pub(super) fn new(
+        path: PathBuf,
+        frames: Vec<Vec<[f64; 3]>>,
+        triangles: Vec<[u32; 3]>,
+    ) -> Result<Self, TruthError> {
+        if frames.len() < FEWEST_FRAMES {
+            let found = frames.len();
+            return Err(TruthError::TooFewFrames { path, found });
+        }
+        Ok(Self {
+            path,
+            frames,
+            triangles,
+        })
+    }
+
+    /// Where it was read from.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// How many frames there are.
+    pub fn frame_count(&self) -> usize {
+        self.frames.len()
+    }
+
+    /// The triangles of every frame.
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
+    }
+
+    /// The vertices of one frame, in the user's coordinates.
+    ///
+    /// # Panics
+    /// If there is no such frame.
+    pub fn vertices(&self, frame: usize) -> &[[f64; 3]] {
+        &self.frames[frame]
+    }
+
+    /// One frame as a shape.
+    ///
+    /// # Panics
+    /// If there is no such frame.
+    pub fn shape(&self, frame: usize) -> Shape {
+        Shape {
+            path: self.path.clone(),
+            vertices: self.frames[frame].clone(),
+            triangles: self.triangles.clone(),
+            normals: None,
+        }
+    }
+
+    /// The stretch between two frames that a run was given as its ends.
+    ///
+    /// # Errors
+    /// [`TruthError::Span`] unless both exist and at least one frame lies between them.
+    pub fn span(&self, from: usize, to: usize) -> Result<Span, TruthError> {
+        let last = self.frames.len() - 1;
+        if to > last || from >= to || to - from < 2 {
+            let path = self.path.clone();
+            return Err(TruthError::Span {
+                path,
+                from,
+                to,
+                last,
+            });
+        }
+        Ok(Span { from, to })
+    }
+
+    /// Whether the ends of a run are the ends of the span: points on both, in the run's normalised
+    /// coordinates, must lie on the frames.
+    ///
+    /// # Errors
+    /// [`TruthError::OtherShape`] if the points of one are too far from its frame: another
+    /// sequence, other frames or other coordinates.
+    ///
+    /// # Panics
+    /// If the span is of another sequence, or there are no points.
+    pub fn check_ends(
+        &self,
+        span: Span,
+        normalisation: &Normalisation,
+        source: &[[f32; 3]],
+        target: &[[f32; 3]],
+    ) -> Result<(), TruthError> {
+        for (end, frame, points) in [("source", span.from, source), ("target", span.to, target)] {
+            let distance = self.distance(frame, normalisation, points);
+            // Points that are not finite numbers are not on the frame either.
+            if distance.is_nan() || distance > SAME_SHAPE_WITHIN {
+                let path = self.path.clone();
+                return Err(TruthError::OtherShape {
+                    path,
+                    frame,
+                    end,
+                    distance,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Mean distance of points from a frame, both normalised: to the nearest of 100,000 samples of
+    /// the frame, which is 0.0016 for points that lie on it.
+    ///
+    /// # Panics
+    /// If there is no such frame, or no points.
+    pub fn distance(
+        &self,
+        frame: usize,
+        normalisation: &Normalisation,
+        points: &[[f32; 3]],
+    ) -> f64 {
+        assert!(!points.is_empty(), "the distance of no points");
+        let vertices = self.normalised(frame, normalisation);
+        let vertices: Vec<_> = vertices
+            .iter()
+            .map(|vertex| vertex.map(f64::from))
+            .collect();
+        let mut rng = ChaCha8Rng::seed_from_u64(0);
+        let samples = shape::sample_surface(&vertices, &self.triangles, END_SAMPLES, &mut rng);
+        let points: Vec<_> = points.iter().map(|point| point.map(f64::from)).collect();
+        let nearest = NeighbourSearch::new(&samples.points).nearest_one_of_each(&points);
+        let distances = nearest.iter().map(|found| found.squared_distance.sqrt());
+        distances.sum::<f64>() / points.len() as f64
+    }
+
+    /// The vertices of one frame in normalised coordinates.
+    pub(super) fn normalised(&self, frame: usize, normalisation: &Normalisation) -> Vec<[f32; 3]> {
+        let vertices = self.frames[frame].iter();
+        vertices
+            .map(|&vertex| normalisation.apply(vertex))
+            .collect()
+    }
+}
+
+/// Two frames with at least one between them; made by [`GroundTruth::span`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Span {
+    from: usize,
+    to: usize,
+}
+
+impl Span {
+    /// The frame at time 0.
+    pub fn from(&self) -> usize {
+        self.from
+    }
+
+    /// The frame at time 1.
+    pub fn to(&self) -> usize {
+        self.to
+    }
+
+    /// The frames strictly between the ends.
+    pub fn between(&self) -> std::ops::Range<usize> {
+        self.from + 1..self.to
+    }
+
+    /// The time of a frame: `(frame - from) / (to - from)`.
+    pub fn time(&self, frame: usize) -> f64 {
+        (frame as f64 - self.from as f64) / (self.to - self.from) as f64
+    }
+}
+
+fn unreadable(path: &Path, reason: std::io::Error) -> TruthError {
+    TruthError::Shape(ShapeError::Unreadable {
+        path: path.to_owned(),
+        reason,
+    })
+}
+
+/// The PLY and OBJ files of a folder, in natural order.
+fn meshes_in(folder: &Path) -> Result<Vec<PathBuf>, TruthError> {
+    let failed = |reason| unreadable(folder, reason);
+    let mut named = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(failed)? {
+        let path = entry.map_err(failed)?.path();
+        let extension = path.extension().unwrap_or_default();
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let mesh = ["ply", "obj"]
+            .iter()
+            .any(|known| extension.eq_ignore_ascii_case(known));
+        // A hidden file is no frame: some systems leave one beside each file.
+        if mesh && !name.starts_with('.') {
+            named.push((name.into_owned(), path));
+        }
+    }
+    named.sort_by(|(a, _), (b, _)| natural_order(a, b));
+    Ok(named.into_iter().map(|(_, path)| path).collect())
+}
+
+/// Names in the order in which people count: runs of digits compare as numbers.
+fn natural_order(a: &str, b: &str) -> Ordering {
+    let (mut left, mut right) = (a, b);
+    while let (Some(x), Some(y)) = (left.chars().next(), right.chars().next()) {
+        let order = if x.is_ascii_digit() && y.is_ascii_digit() {
+            let (one, other) = (take_digits(&mut left), take_digits(&mut right));
+            // Without leading zeros the longer number is the greater, whatever its size.
+            one.len().cmp(&other.len()).then(one.cmp(other))
+        } else {
+            (left, right) = (&left[x.len_utf8()..], &right[y.len_utf8()..]);
+            x.cmp(&y)
+        };
+        if order != Ordering::Equal {
+            return order;
+        }
+    }
+    // One is the beginning of the other, or they differ in leading zeros only.
+    left.len().cmp(&right.len()).then(a.cmp(b))
+}
+
+/// Takes the digits that the text begins with, and gives them without leading zeros.
+fn take_digits<'a>(text: &mut &'a str) -> &'a str {
+    let end = text
+        .find(|c: char| !c.is_ascii_digit())
+        .unwrap_or(text.len());
+    let (digits, rest) = text.split_at(end);
+    *text = rest;
+    digits.trim_start_matches('0')
+}
+
+/// Whether a shape is the first one with its vertices moved.
+fn consistent(first: &Shape, shape: &Shape) -> Result<(), TruthError> {
+    let problem = if shape.vertices.len() != first.vertices.len() {
+        let (found, needed) = (shape.vertices.len(), first.vertices.len());
+        format!("{found} vertices instead of the {needed}")
+    } else if shape.triangles.len() != first.triangles.len() {
+        let (found, needed) = (shape.triangles.len(), first.triangles.len());
+        format!("{found} triangles instead of the {needed}")
+    } else {
+        let pairs = shape.triangles.iter().zip(&first.triangles);
+        let Some((triangle, (found, needed))) = pairs.enumerate().find(|(_, (a, b))| a != b) else {
+            return Ok(());
+        };
+        format!("triangle {triangle} is {found:?} instead of the {needed:?}")
+    };
+    Err(TruthError::Inconsistent {
+        path: shape.path.clone(),
+        problem,
+        first: first.path.clone(),
+    })
+}
+
+#[cfg(test)]
+#[path = "truth_tests.rs"]
+mod tests;
