@@ -3,7 +3,7 @@
 //!
 //! A reader's path: `main.rs`, [`cli`] (`train.rs`), [`learner`] (`mod.rs`, `step.rs`), then the terms and
 //! operators in [`isomorph_model`]. Arrows run one way: `cli -> learner -> model`,
-//! `cli -> surface -> model`.
+//! `cli -> surface -> model`, `cli -> evaluate -> shape`, `cli -> compare -> evaluate`.
 
 // The thrice lifted autodiff types nest deeper than the default limit allows.
 #![recursion_limit = "256"]
@@ -11,6 +11,8 @@
 pub mod atomic;
 pub mod backend;
 pub mod cli;
+pub mod compare;
+pub mod evaluate;
 pub mod learner;
 pub mod recipe;
 pub mod report;

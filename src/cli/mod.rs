@@ -4,11 +4,15 @@
 //! a bad recipe, 130 interrupted with a checkpoint written.
 
 mod bench;
+mod candidate;
+mod compare;
+mod evaluate;
 mod extract;
 mod info;
 mod init;
 mod resume;
 mod train;
+mod trained;
 mod training;
 
 use std::process::ExitCode;
@@ -18,6 +22,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use clap::{Args, Parser, Subcommand};
 
 use crate::backend::{BackendError, BackendName};
+use crate::compare::PlanError;
 use crate::recipe::RecipeError;
 use crate::report::Verbosity;
 use crate::run_directory::RunError;
@@ -43,6 +48,8 @@ enum Command {
     Train(train::TrainArgs),
     Resume(resume::ResumeArgs),
     Extract(extract::ExtractArgs),
+    Evaluate(evaluate::EvaluateArgs),
+    Compare(compare::CompareArgs),
     Init(init::InitArgs),
     Info(info::InfoArgs),
     Bench(bench::BenchArgs),
@@ -102,6 +109,8 @@ pub fn run(cli: Cli) -> ExitCode {
         Command::Train(args) => train::run(args),
         Command::Resume(args) => resume::run(args),
         Command::Extract(args) => extract::run(args),
+        Command::Evaluate(args) => evaluate::run(args),
+        Command::Compare(args) => compare::run(args),
         Command::Init(args) => init::run(args),
         Command::Info(args) => info::run(args),
         Command::Bench(args) => bench::run(args),
@@ -125,6 +134,7 @@ fn is_usage(error: &anyhow::Error) -> bool {
     error.chain().any(|cause| {
         cause.is::<RecipeError>()
             || cause.is::<Usage>()
+            || cause.is::<PlanError>()
             || cause.is::<GridError>()
             || matches!(
                 cause.downcast_ref::<BackendError>(),

@@ -1,0 +1,123 @@
+//! The comparison of methods on one sequence: what is run, what was measured and kept, and the table
+//! and figure made of it. Training and evaluating are the caller's; nothing here knows burn.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | `plan.rs` | which pairs and which methods: `--pairs`, `--methods`, `--variant` |
+//! | `protocol.rs` | the pairs of frames of the protocol, by the name of a sequence |
+//! | `entry.rs` | what is known of one method on one pair, and of the machine it ran on |
+//! | `digest.rs` | the fingerprint of all that decides a result |
+//! | `store.rs` | the folder of results: one file per pair and method, so that a comparison resumes |
+//! | `comparison.rs` | all results side by side, with their means: `comparison.json` |
+//! | `table.rs`, `columns.rs` | the same as Markdown: `table.md` |
+//! | `figure.rs` | error over time: `error.svg` |
+//! | `chart.rs`, `axis.rs`, `stroke.rs`, `legend.rs` | panels of lines as SVG, for this figure and others |
+//!
+//! Arrows run one way: `cli -> compare -> evaluate` (its result types only), `compare -> atomic`.
+
+mod axis;
+mod chart;
+mod columns;
+mod comparison;
+mod digest;
+mod entry;
+mod figure;
+mod legend;
+mod plan;
+mod protocol;
+mod store;
+mod stroke;
+mod table;
+#[cfg(test)]
+mod testing;
+
+use std::io;
+
+use crate::atomic::write_atomically;
+
+pub use chart::{ChartError, Line, Panel, Scale, Stroke, line_chart};
+pub use comparison::{Absent, Comparison, MethodMean, MethodResult, PairComparison};
+pub use digest::{DigestError, Inputs};
+pub use entry::{Entry, Machine, Network, command_line, now};
+pub use figure::error_figure;
+pub use plan::{FramePair, MethodPlan, Plan, PlanError, Request, sequence_name};
+pub use protocol::protocol_pairs;
+pub use store::{Lookup, Store, StoreError, file_stem};
+pub use table::table;
+
+/// File of the table in a sequence's folder.
+pub const TABLE: &str = "table.md";
+/// File of the comparison in a sequence's folder.
+pub const COMPARISON: &str = "comparison.json";
+/// File of the figure in a sequence's folder.
+pub const FIGURE: &str = "error.svg";
+
+/// Why the results could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum ReportError {
+    /// The file system refused; the message names the file.
+    #[error("{0}")]
+    Io(#[from] io::Error),
+    /// The figure cannot be drawn.
+    #[error("{FIGURE}: {0}")]
+    Chart(#[from] ChartError),
+}
+
+/// Writes `table.md`, `comparison.json` and `error.svg` of what is done so far into the store's folder,
+/// each whole, and returns the comparison. With nothing done yet nothing is written.
+///
+/// # Errors
+/// [`ReportError`].
+pub fn write_report(
+    store: &Store,
+    plan: &Plan,
+    entries: &[Entry],
+) -> Result<Comparison, ReportError> {
+    let comparison = Comparison::new(plan, entries);
+    if comparison.pairs.is_empty() {
+        return Ok(comparison);
+    }
+    let json = serde_json::to_string_pretty(&comparison).map_err(io::Error::from)? + "\n";
+    let files = [
+        (TABLE, table(&comparison)),
+        (COMPARISON, json),
+        (FIGURE, error_figure(plan, entries)?),
+    ];
+    for (name, text) in files {
+        write_atomically(&store.folder().join(name), |out| {
+            out.write_all(text.as_bytes())
+        })?;
+    }
+    Ok(comparison)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_report_is_three_files_and_the_json_reads_back_as_the_comparison() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let store = Store::open(folder.path(), "fox_survey").expect("a store");
+        let (plan, entries) = testing::two_pairs_of_three_methods();
+        let comparison = write_report(&store, &plan, &entries).expect("written");
+        let read = |name: &str| std::fs::read_to_string(store.folder().join(name)).expect(name);
+        let back: Comparison = serde_json::from_str(&read(COMPARISON)).expect("JSON");
+        assert_eq!(back.pairs.len(), comparison.pairs.len());
+        assert_eq!(back.mean.len(), 3);
+        assert!(read(TABLE).starts_with("# fox_survey"));
+        assert!(read(FIGURE).starts_with("<svg"));
+    }
+
+    #[test]
+    fn nothing_is_written_of_nothing() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let store = Store::open(folder.path(), "fox_survey").expect("a store");
+        let (plan, _) = testing::two_pairs_of_three_methods();
+        let comparison = write_report(&store, &plan, &[]).expect("nothing to refuse");
+        assert!(comparison.pairs.is_empty() && comparison.mean.is_empty());
+        assert_eq!(comparison.missing.len(), 6, "three methods on two pairs");
+        let left = std::fs::read_dir(store.folder()).expect("a folder").count();
+        assert_eq!(left, 0);
+    }
+}
