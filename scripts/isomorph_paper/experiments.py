@@ -1,0 +1,284 @@
+"""All experiments of the paper, as data: which sequences, which rows, which picture.
+
+A row is a method and the recipe keys in which it differs. `ours` is the preset `quick` at the small
+size and `paper` at the full one, so that each ablation is of the recipe whose size it has. What the
+rows of a table have in common is said once, in `keys` of the experiment.
+"""
+
+from dataclasses import dataclass
+
+from . import PaperError
+
+OURS = "ours"
+
+# 5 % of the 20,000 points of each shape: the evaluation protocol's (DESIGN, section 4).
+POINTS = 20_000
+PAIRS = 1_000
+
+
+@dataclass(frozen=True)
+class Size:
+    """The budget that every row of a table gets, whichever its method."""
+
+    name: str
+    ours: str
+    steps: int
+    batch: int
+    every: int
+    """Every so many frames are evaluated where an experiment does not need them all."""
+
+
+SMALL = Size("small", "quick", 1_000, 2_200, every=3)
+FULL = Size("full", "paper", 10_000, 4_000, every=1)
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A sequence and the pairs of frames that are learned."""
+
+    sequence: str
+    pairs: tuple[tuple[int, int], ...]
+    made_from: str | None = None
+    """The sequence that this one is made of, where it is made here."""
+
+
+@dataclass(frozen=True)
+class Input:
+    """Input files that are made for a row; without one, `compare` makes its own."""
+
+    kind: str
+    """A maker of inputs.py."""
+    amount: float = 0.0
+    """The share of pairs that are swapped, or the points of the target."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of a table."""
+
+    label: str
+    method: str = OURS
+    keys: tuple[str, ...] = ()
+    """`section.key=value`"""
+    at: float | None = None
+    """Where it is on the horizontal axis of a sweep."""
+    family: str = OURS
+    """The line of a sweep that it belongs to."""
+    input: Input | None = None
+    size: str | None = None
+    """The only size at which the row is run."""
+    pair: tuple[str, int, int] | None = None
+    """The only pair that it is run on."""
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """One table or figure of the paper."""
+
+    name: str
+    about: str
+    subjects: tuple[Subject, ...]
+    rows: tuple[Row, ...]
+    figure: str = "time"
+    """"time": error over time; "sweep": error against `axis`; "volume": volume over time."""
+    axis: str = ""
+    logarithmic: bool = False
+    keys: tuple[str, ...] = ()
+    all_frames: bool = False
+
+    def rows_at(self, size: Size) -> list[Row]:
+        return [row for row in self.rows if row.size in (None, size.name)]
+
+
+FOX = Subject("fox_survey", ((0, 18), (20, 47)))
+FOX_HEAD = Subject("fox_survey", ((0, 18),))
+BEAR = Subject("bear_walk", ((0, 16), (16, 30), (30, 47)))
+ARMS = Subject("human_raise_arms", ((0, 26),))
+HEAVY = Subject("human_male_to_heavy", ((0, 10),))
+FEET = Subject("human_feet_together", ((0, 26),), made_from="human_raise_arms")
+
+# Without the terms that are ours, so that the term under study is not covered by another one.
+NO_STRAIN = ("loss.strain=0",)
+PAPER_TERMS = ("loss.strain=0", "loss.on-surface=0", "loss.transported-normals=0")
+SMALL_NETWORKS = (
+    "implicit.depth=5",
+    "implicit.width=128",
+    "velocity.depth=4",
+    "velocity.width=96",
+)
+ROBUST = ("loss.matching-scale=0.1",)
+
+
+def shares(
+    kind: str, percents: tuple[int, ...], keys: tuple[str, ...], family: str
+) -> tuple[Row, ...]:
+    """A row for each percentage of the pairs."""
+    return tuple(
+        Row(
+            f"{percent} % swapped, {family}".replace(",", ":"),
+            OURS,
+            keys,
+            percent,
+            family,
+            Input(kind, percent / 100),
+        )
+        for percent in percents
+    )
+
+
+BASELINES = (
+    Row("mlp", "mlp"),
+    Row("sdf-blend", "sdf-blend"),
+    Row("lipmlp", "lipmlp"),
+    Row("nise", "nise"),
+    Row("nise-velocity", "nise-velocity"),
+    Row("eigenbasis", "eigenbasis"),
+    # One optimisation per time makes it hours a pair: one pair is what two cores allow.
+    Row("nfgp", "nfgp", pair=("fox_survey", 0, 18)),
+)
+
+EXPERIMENTS = (
+    Experiment(
+        "errors",
+        "Error of the shapes in between: every method under one budget, on fox and bear.",
+        (FOX, BEAR),
+        (
+            Row("quick", "quick"),
+            Row("default", "default", size="full"),
+            Row("paper", "paper", size="full"),
+            Row("paper (small networks)", "paper", SMALL_NETWORKS, size="small"),
+            *BASELINES,
+        ),
+        all_frames=True,
+    ),
+    Experiment(
+        "correspondences",
+        "Error against the share of the 20,000 points whose correspondence is known.",
+        (FOX_HEAD,),
+        tuple(
+            Row(f"{percent} %", keys=(f"data.correspondence-fraction={percent / 100}",), at=percent)
+            for percent in (1, 5, 10, 20)
+        ),
+        "sweep",
+        "known correspondences, % of the points",
+        # The frames' own vertices: fox has 4610, the 20 % are 4000 of them.
+        keys=("data.correspondences=same-vertices",),
+    ),
+    Experiment(
+        "local-swaps",
+        "Error against the share of pairs that got the target of their 5th nearest neighbour.",
+        (FOX_HEAD,),
+        (
+            *shares("local-swaps", (0, 5, 10, 20), (), "plain distance"),
+            *shares("local-swaps", (0, 20), ROBUST, "Geman-McClure 0.1"),
+        ),
+        "sweep",
+        "pairs swapped with their 5th nearest neighbour, %",
+    ),
+    Experiment(
+        "global-swaps",
+        "Error against the share of pairs whose targets are permuted among each other.",
+        (FOX_HEAD,),
+        (
+            *shares("global-swaps", (0, 1, 5, 10), (), "plain distance"),
+            *shares("global-swaps", (0, 1, 5, 10), ROBUST, "Geman-McClure 0.1"),
+        ),
+        "sweep",
+        "pairs permuted, %",
+    ),
+    Experiment(
+        "level-set",
+        "The modified level-set equation (MLSE) against the original with Eikonal terms (OLSE).",
+        (FOX_HEAD, ARMS),
+        (
+            Row("MLSE", keys=("loss.level-set-form=mlse",), size="small"),
+            Row("OLSE", keys=("loss.level-set-form=olse",), size="small"),
+            Row("MLSE: terms of the paper alone", keys=("loss.level-set-form=mlse", *PAPER_TERMS)),
+            Row("OLSE: terms of the paper alone", keys=("loss.level-set-form=olse", *PAPER_TERMS)),
+        ),
+    ),
+    Experiment(
+        "divergence",
+        "Volume over time with and without the divergence term: a shape that grows, and one not.",
+        (HEAVY, ARMS),
+        (
+            Row("as shipped: with strain", size="small"),
+            Row("divergence on", keys=NO_STRAIN),
+            Row("divergence off", keys=("loss.divergence=0", *NO_STRAIN)),
+        ),
+        "volume",
+        all_frames=True,
+    ),
+    Experiment(
+        "smoothness",
+        "The smoothness term on and off, with 1 % of the correspondences.",
+        (FOX_HEAD, ARMS),
+        (
+            Row("as shipped: with strain", size="small"),
+            Row("smoothness on", keys=("loss.smoothness=20", *NO_STRAIN)),
+            Row("smoothness off", keys=("loss.smoothness=0", *NO_STRAIN)),
+        ),
+        keys=("data.correspondence-fraction=0.01",),
+    ),
+    Experiment(
+        "sparse",
+        "Error against the points of the target; the source has 20,000, and 1000 pairs are known.",
+        (FOX_HEAD,),
+        tuple(
+            Row(f"{points} points", at=points, input=Input("sparse", points))
+            for points in (20_000, 10_000, 5_000, 2_000)
+        ),
+        "sweep",
+        "points of the target",
+        logarithmic=True,
+    ),
+    Experiment(
+        "incomplete",
+        "Three holes in the source and three others in the target; the truth has none.",
+        (FOX_HEAD, ARMS),
+        (
+            Row("complete", input=Input("holes", 0)),
+            Row("with holes", input=Input("holes", 3)),
+        ),
+    ),
+    Experiment(
+        "topology",
+        "The feet merge while the arms rise: the source has genus 0, the target's surface genus 1.",
+        (FEET,),
+        (
+            Row("ours", input=Input("outer-surface")),
+            Row("sdf-blend", "sdf-blend", input=Input("outer-surface")),
+            Row("lipmlp", "lipmlp", input=Input("outer-surface")),
+            Row("nise", "nise", input=Input("outer-surface")),
+        ),
+    ),
+    Experiment(
+        "no-correspondences",
+        "No correspondence at all, beside methods that never use one.",
+        (FOX_HEAD, ARMS),
+        (
+            Row("5 % known"),
+            Row("none known", keys=("data.correspondences=none",)),
+            Row("lipmlp", "lipmlp"),
+            Row("nise", "nise"),
+        ),
+    ),
+)
+
+
+def named(name: str) -> Experiment:
+    """The experiment of this name."""
+    for experiment in EXPERIMENTS:
+        if experiment.name == name:
+            return experiment
+    names = ", ".join(experiment.name for experiment in EXPERIMENTS)
+    raise PaperError(f"{name}: no such experiment; there are {names}, all and list")
+
+
+def runs_of(experiment: Experiment, size: Size) -> int:
+    """How many trainings the experiment takes."""
+    return sum(
+        sum(row.pair in (None, (subject.sequence, *pair)) for row in experiment.rows_at(size))
+        for subject in experiment.subjects
+        for pair in subject.pairs
+    )

@@ -1,0 +1,178 @@
+#!/usr/bin/env python3
+"""Makes a table or figure of the paper on our sequences, by calling `isomorph compare`.
+
+    python3 scripts/paper.py NAME [--full] [--binary PATH] [--backend B] [--out DIR] [--dry-run]
+
+NAME is an experiment (`list` names them) or `all`. The results go to DIR/NAME: table.md,
+table.json, figure.svg, run.json (command lines, seed, machine, date, versions, statistics of the
+inputs), and below it what `compare` wrote; with --full, to DIR/NAME-full. An interrupted experiment
+goes on where it stopped when the same command is given again.
+
+Without --full, a run is 1000 steps of 2200 points of the preset `quick`: 1 to 2 minutes on two
+cores. With it, 10,000 steps of 4000 points of the preset `paper`, as printed: hours.
+
+Needs numpy and matplotlib. Exit status: 0 done, 1 failed, 2 usage, 130 interrupted.
+"""
+
+import argparse
+import os
+import shlex
+import sys
+import time
+from pathlib import Path
+
+from isomorph_paper import PaperError, experiments, figures, inputs, record, report, runs
+from isomorph_paper.sequences import digest, write_atomically
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def arguments(words: list[str]) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "isomorph-paper"
+    add = parser.add_argument
+    add("name", metavar="NAME", help="an experiment, `all` or `list`")
+    add("--full", action="store_true", help="the paper's size instead of one for two cores")
+    add("--binary", default=str(ROOT / "target/release/isomorph"), help="the isomorph to call")
+    add("--backend", help="handed on to isomorph")
+    add("--out", type=Path, default=ROOT / "scripts/results", help="where results go")
+    add("--dry-run", action="store_true", help="print the commands, make nothing")
+    add(
+        "--sequences",
+        type=Path,
+        default=ROOT.parent / "shared/data",
+        help="the folder of the .anime files",
+    )
+    add(
+        "--cache",
+        type=Path,
+        default=cache,
+        help="where made inputs go; large, and made again at need",
+    )
+    add("--seed", type=int, default=0, help="of the inputs and of the training")
+    add("--steps", type=int, help="other steps than the size has")
+    add("--batch", type=int, help="another batch than the size has")
+    options = parser.parse_args(words)
+    for name, least in (("seed", 0), ("steps", 1), ("batch", 64)):
+        value = getattr(options, name)
+        if value is not None and value < least:
+            parser.error(f"--{name} = {value}: must be {least} or more")
+    return options
+
+
+def main(words: list[str]) -> int:
+    options = arguments(words)
+    try:
+        if options.name == "list":
+            show_list()
+            return 0
+        names = (
+            [each.name for each in experiments.EXPERIMENTS]
+            if options.name == "all"
+            else [options.name]
+        )
+        chosen = [experiments.named(name) for name in names]
+    except PaperError as error:
+        print(f"paper.py: {error}", file=sys.stderr)
+        return 2
+    failed = []
+    for experiment in chosen:
+        try:
+            run(experiment, options, ["scripts/paper.py", *words])
+        except PaperError as error:
+            print(f"paper.py: {experiment.name}: {error}", file=sys.stderr)
+            failed.append(experiment.name)
+        except KeyboardInterrupt:
+            print("paper.py: interrupted; the same command goes on from here", file=sys.stderr)
+            return 130
+    if failed and len(chosen) > 1:
+        print(f"paper.py: failed: {', '.join(failed)} of {len(chosen)}", file=sys.stderr)
+    return 1 if failed else 0
+
+
+def show_list() -> None:
+    for each in experiments.EXPERIMENTS:
+        count = f"{experiments.runs_of(each, experiments.SMALL)} runs"
+        print(f"{each.name:<20} {count:<8} {each.about}")
+
+
+def run(experiment: experiments.Experiment, options: argparse.Namespace, words: list[str]) -> None:
+    """One experiment from its inputs to its figure."""
+    size = experiments.FULL if options.full else experiments.SMALL
+    budget = runs.Budget(
+        size,
+        options.steps or size.steps,
+        options.batch or size.batch,
+        options.seed,
+        options.backend,
+    )
+    folder = options.out / (f"{experiment.name}-full" if options.full else experiment.name)
+    paths = runs.Paths(options.sequences.resolve(), options.cache.resolve(), folder)
+    plan = {
+        subject: runs.planned(options.binary, experiment, subject, budget, paths)
+        for subject in experiment.subjects
+    }
+    if options.dry_run:
+        print(f"# {experiment.name}: {experiments.runs_of(experiment, size)} runs")
+        for command in (each for commands in plan.values() for each in commands):
+            print(shlex.join(command))
+        return
+    figures.check()
+    wanted = record.settings(experiment.name, budget)
+    record.begin(folder, wanted)
+    done, truths = carry_out(experiment, plan, budget, paths)
+    measured = runs.collect(experiment, size, folder)
+    how = {
+        "command": shlex.join(words),
+        "binary": options.binary,
+        "sequences": sequence_digests(truths),
+        **done,
+    }
+    leave(experiment, budget, measured, truths, folder, shlex.join(words))
+    record.write(folder, wanted, how)
+
+
+def carry_out(experiment, plan, budget, paths) -> tuple[dict, dict]:
+    """Makes the inputs and runs the commands; what was done, and the sequences."""
+    calls, statistics, truths = [], {}, {}
+    for subject, commands in plan.items():
+        sequence = inputs.sequence_of(subject, paths.sequences, paths.cache)
+        truths[subject.sequence] = sequence
+        rows = experiment.rows_at(budget.size)
+        made = inputs.make_all(rows, subject, sequence, budget.seed, paths.cache)
+        for files in made.values():
+            statistics[files.folder.name] = files.statistics
+        for command in commands:
+            started = time.monotonic()
+            runs.call_binary(command)
+            calls.append(
+                {"command": shlex.join(command), "seconds": round(time.monotonic() - started, 1)}
+            )
+    return {"calls": calls, "inputs": statistics}, truths
+
+
+def sequence_digests(truths: dict) -> dict:
+    return {name: f"sha256 {digest(sequence.path)}" for name, sequence in truths.items()}
+
+
+def leave(experiment, budget, measured, truths, folder: Path, command: str) -> None:
+    """Writes the tables and the figure."""
+    machine = record.machine()
+    place = f"{machine['processor']}, {machine['cores']} cores"
+    how = f"Made by `{command}` on {record.now()[:10]}, {place}."
+    texts = {
+        "table.md": report.markdown(experiment, budget, measured, how),
+        "table.json": report.numbers(experiment, measured),
+    }
+    for name, text in texts.items():
+        write_atomically(folder / name, text.encode())
+    write_atomically(folder / "figure.svg", figures.draw(experiment, measured, truths))
+    print(f"{folder / 'table.md'}\n\n{texts['table.md']}")
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,256 @@
+#!/usr/bin/env python3
+"""Tests of scripts/paper.py, without isomorph: python3 -m unittest discover scripts
+
+A fake `isomorph` writes what `compare` would, so that whole experiments run in seconds. Needs
+numpy, and matplotlib for the figures.
+"""
+
+import contextlib
+import io
+import json
+import os
+import sys
+import tempfile
+import unittest
+import xml.etree.ElementTree as xml
+from pathlib import Path
+from unittest import mock
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+import paper
+from isomorph_paper import PaperError, experiments, inputs, runs, sequences
+from test_degrade import sphere
+
+FAKE = Path(__file__).with_name("fake_isomorph.py")
+
+EXPECTED_FILES = {"table.md", "table.json", "figure.svg", "run.json"}
+
+
+class Declarations(unittest.TestCase):
+    def test_the_paper_is_covered(self):
+        names = {experiment.name for experiment in experiments.EXPERIMENTS}
+        wanted = "errors correspondences local-swaps global-swaps level-set divergence smoothness "
+        wanted += "sparse incomplete topology no-correspondences"
+        self.assertEqual(names, set(wanted.split()))
+
+    def test_labels_are_unique_and_survive_the_command_line(self):
+        for experiment in experiments.EXPERIMENTS:
+            for size in (experiments.SMALL, experiments.FULL):
+                labels = [row.label for row in experiment.rows_at(size)]
+                self.assertEqual(len(labels), len(set(labels)), experiment.name)
+                for label in labels:
+                    self.assertNotRegex(label, "[=,|]", experiment.name)
+
+    def test_keys_are_those_of_the_recipe(self):
+        text = (paper.ROOT / "src/recipe/keys.rs").read_text()
+        for experiment in experiments.EXPERIMENTS:
+            rows = [key for row in experiment.rows for key in row.keys]
+            for key in [*rows, *experiment.keys, *inputs.keys_of(Path("/folder"))]:
+                section, field = key.partition("=")[0].split(".")
+                self.assertRegex(text, rf"\b{section}: \w+Recipe")
+                self.assertRegex(text, rf"\n        {field.replace('-', '_')}: ", key)
+
+    def test_sweeps_say_where_each_row_is_and_inputs_have_makers(self):
+        for experiment in experiments.EXPERIMENTS:
+            for row in experiment.rows:
+                self.assertEqual(row.at is not None, experiment.figure == "sweep", row)
+                if row.input:
+                    self.assertIn(row.input.kind, inputs.MAKERS)
+            if any(row.input for row in experiment.rows):
+                self.assertTrue(all(len(subject.pairs) == 1 for subject in experiment.subjects))
+
+    def test_a_row_of_one_pair_is_called_first_and_alone(self):
+        errors = experiments.named("errors")
+        calls = runs.calls(errors, experiments.FOX, Path("fox.anime"), experiments.SMALL)
+        self.assertEqual([row.label for row in calls[0].rows], ["nfgp"])
+        self.assertEqual([call.pairs for call in calls], [((0, 18),), ((0, 18), (20, 47))])
+        bear = runs.calls(errors, experiments.BEAR, Path("bear.anime"), experiments.SMALL)
+        self.assertEqual(len(bear), 1)
+        self.assertNotIn("nfgp", [row.label for row in bear[0].rows])
+
+
+class Experiments(unittest.TestCase):
+    """Whole experiments on spheres that bear the names of our sequences."""
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = Path(folder.name)
+        vertices, triangles = sphere(rings=26, around=44)
+        growing = np.stack([vertices * (1 + 0.02 * k) + [0, 0, 0.01 * k] for k in range(48)])
+        names = {
+            subject.made_from or subject.sequence
+            for each in experiments.EXPERIMENTS
+            for subject in each.subjects
+        }
+        for name in names:
+            sequences.write_sequence(self.folder / "in" / f"{name}.anime", growing, triangles)
+        self.binary = self.folder / "isomorph"
+        self.binary.write_text(f'#!/bin/sh\nexec "{sys.executable}" "{FAKE}" "$@"\n')
+        self.binary.chmod(0o755)
+        self.log = self.folder / "log"
+        os.environ["FAKE_LOG"] = str(self.log)
+        self.addCleanup(os.environ.pop, "FAKE_FAILS", None)
+
+    def paper(self, *words):
+        """The status, stdout and stderr of a command."""
+        places = ["--sequences", self.folder / "in", "--cache", self.folder / "cache"]
+        places += ["--out", self.folder / "out", "--binary", self.binary]
+        out, err = io.StringIO(), io.StringIO()
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+            status = paper.main([*words, *map(str, places)])
+        return status, out.getvalue(), err.getvalue()
+
+    def calls(self):
+        return [json.loads(line) for line in self.log.read_text().splitlines()]
+
+    def test_errors_leaves_table_numbers_figure_and_record(self):
+        status, out, err = self.paper("errors")
+        self.assertEqual(status, 0, err)
+        folder = self.folder / "out/errors"
+        self.assertEqual({path.name for path in folder.iterdir() if path.is_file()}, EXPECTED_FILES)
+        text = (folder / "table.md").read_text()
+        self.assertIn(text, out)
+        self.assertIn("## fox_survey, frames 0-18, 20-47", text)
+        self.assertIn("## bear_walk, frames 0-16, 16-30, 30-47", text)
+        self.assertIn("nfgp (1 of 2 pairs)", text)
+        # The error grows with the label: mlp wins, 0.013 squared is 0.169e-3. nfgp has fewer pairs.
+        best = [line for line in text.splitlines() if "**0.169**" in line]
+        self.assertEqual([line.split("|")[1].strip() for line in best], ["mlp", "mlp"])
+        rows = json.loads((folder / "table.json").read_text())["sequences"][0]["rows"]
+        mlp = next(row for row in rows if row["row"] == "mlp")
+        self.assertAlmostEqual(mlp["chamfer_squared"], 0.013**2, delta=1e-12)
+        self.assertAlmostEqual(mlp["aligned_hausdorff"], 3 * 0.013 / 2, delta=1e-12)
+        self.assertEqual((mlp["pairs"], mlp["training_seconds"]), (2, 12.5))
+        names = [row["row"] for row in rows][-2:]
+        self.assertTrue(names[0].startswith("straight") and names[1].startswith("floor"))
+
+    def test_straight_lines_that_beat_every_row_are_marked(self):
+        # A label of 60 letters has the error 0.07, straight lines 0.05.
+        row = experiments.Row("x" * 60)
+        other = experiments.Row("y" * 61)
+        ours = experiments.Experiment("test", "A test.", (experiments.ARMS,), (row, other))
+        with mock.patch.object(experiments, "EXPERIMENTS", (ours,)):
+            status, out, err = self.paper("test")
+        self.assertEqual(status, 0, err)
+        straight = next(line for line in out.splitlines() if line.startswith("| straight"))
+        self.assertIn(" 2.500 (!) |", straight)
+        self.assertIn(" **4.900** |", next(line for line in out.splitlines() if "xx" in line))
+        self.assertEqual(self.paper("errors")[1].count("(!)"), 1)
+
+    def test_the_record_says_how_it_was_made(self):
+        self.paper("global-swaps", "--seed", "3")
+        record = json.loads((self.folder / "out/global-swaps/run.json").read_text())
+        self.assertEqual(record["settings"]["seed"], 3)
+        self.assertEqual(record["settings"]["steps"], 1000)
+        self.assertIn("scripts/paper.py global-swaps --seed 3", record["command"])
+        self.assertEqual(record["versions"]["isomorph"], "isomorph 0.0.0-fake")
+        self.assertTrue(record["machine"]["processor"] and record["machine"]["cores"] >= 1)
+        self.assertEqual(len(record["calls"]), 1)
+        wrong = {made["wrong pairs"] for made in record["inputs"].values()}
+        self.assertEqual(wrong, {0, 10, 50, 100})
+        words = self.calls()[0]
+        self.assertIn("training.seed=3", words)
+        robust = [word for word in words if "loss.matching-scale=0.1" in word]
+        self.assertEqual(len(robust), 4)
+
+    def test_divergence_draws_the_true_volume_and_each_row(self):
+        status, _, err = self.paper("divergence")
+        self.assertEqual(status, 0, err)
+        figure = (self.folder / "out/divergence/figure.svg").read_text()
+        texts = [each.text for each in xml.fromstring(figure).iter() if each.tag.endswith("text")]
+        for label in ("truth", "divergence on", "divergence off", "human_male_to_heavy, 0-10"):
+            self.assertEqual(texts.count(label), 1, label)
+        variants = [word for word in self.calls()[0] if "divergence off" in word]
+        self.assertEqual(variants, ["divergence off=quick,loss.divergence=0,loss.strain=0"])
+
+    def test_every_other_experiment_runs_to_its_figure(self):
+        for name in (
+            "correspondences",
+            "local-swaps",
+            "sparse",
+            "incomplete",
+            "topology",
+            "smoothness",
+        ):
+            with self.subTest(name):
+                status, _, err = self.paper(name)
+                self.assertEqual(status, 0, err)
+                xml.parse(self.folder / "out" / name / "figure.svg")
+
+    def test_the_same_numbers_give_the_same_bytes(self):
+        self.paper("sparse")
+        kept = {path: path.read_bytes() for path in (self.folder / "cache").rglob("*.ply")}
+        figure = self.folder / "out/sparse/figure.svg"
+        before = figure.read_bytes()
+        self.paper("sparse")
+        self.assertEqual(figure.read_bytes(), before)
+        self.assertEqual({path: path.read_bytes() for path in kept}, kept)
+        self.assertEqual(len(kept), 8)
+
+    def test_the_full_size_is_the_papers_in_a_folder_of_its_own(self):
+        self.assertEqual(self.paper("level-set", "--full", "--backend", "wgpu")[0], 0)
+        self.assertTrue((self.folder / "out/level-set-full/table.md").exists())
+        words = self.calls()[0]
+        for word in ("training.steps=10000", "training.batch=4000", "wgpu"):
+            self.assertIn(word, words)
+        self.assertNotIn("--every", words)
+        self.assertTrue(any("=paper,loss.level-set-form=olse" in word for word in words))
+
+    def test_a_dry_run_prints_the_commands_and_makes_nothing(self):
+        before = set(self.folder.rglob("*"))
+        status, out, _ = self.paper("all", "--dry-run")
+        self.assertEqual(status, 0)
+        self.assertEqual(set(self.folder.rglob("*")), before)
+        self.assertEqual(out.count(" compare --sequence "), 18)
+        self.assertIn("# errors: 41 runs", out)
+
+    def test_the_commands_of_a_dry_run_are_those_that_are_run(self):
+        _, out, _ = self.paper("topology", "--dry-run")
+        self.paper("topology")
+        record = json.loads((self.folder / "out/topology/run.json").read_text())
+        self.assertEqual(out.splitlines()[1:], [call["command"] for call in record["calls"]])
+
+    def test_results_of_other_settings_are_not_mixed(self):
+        self.paper("sparse")
+        status, _, err = self.paper("sparse", "--seed", "1")
+        self.assertEqual(status, 1)
+        self.assertRegex(err, "run.json: seed = 0, now 1; set another --out")
+
+    def test_a_failed_run_is_said_and_leaves_no_table(self):
+        os.environ["FAKE_FAILS"] = "1"
+        status, _, err = self.paper("sparse")
+        self.assertEqual(status, 1)
+        self.assertIn("compare: failed (status 1)", err)
+        self.assertFalse((self.folder / "out/sparse/table.md").exists())
+        os.environ["FAKE_FAILS"] = "130"
+        self.assertEqual(self.paper("all")[0], 130)
+
+    def test_missing_binaries_and_unknown_names_are_said(self):
+        self.binary.unlink()
+        status, _, err = self.paper("level-set")
+        self.assertEqual(status, 1)
+        self.assertRegex(err, "cannot be started.*--binary")
+        status, _, err = self.paper("erors")
+        self.assertEqual(status, 2)
+        self.assertIn("no such experiment; there are errors, correspondences", err)
+
+    def test_the_newest_result_of_a_row_counts(self):
+        folder = self.folder / "entries"
+        folder.mkdir()
+        entry = {"method": "a", "from": 0, "to": 5, "evaluation": {"frames": [], "mean": {}}}
+        for name, date in (("1", "2026-02-01"), ("2", "2026-01-01")):
+            (folder / f"{name}.json").write_text(json.dumps(entry | {"date": date, "name": name}))
+        (folder / "comparison.json").write_text('{"pairs": []}')
+        entries = runs.read_entries(folder)
+        self.assertEqual([found["name"] for found in entries.values()], ["1"])
+        (folder / "3.json").write_text("{")
+        with self.assertRaisesRegex(PaperError, "3.json: not JSON"):
+            runs.read_entries(folder)
+
+
+if __name__ == "__main__":
+    unittest.main()
