@@ -4,6 +4,14 @@
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
+/// What the names of temporary files begin with.
+const TEMPORARY: &str = ".isomorph-";
+
+/// Whether a file of this name is what a killed [`write_atomically`] left behind.
+pub fn is_left_over(name: &std::ffi::OsStr) -> bool {
+    name.to_string_lossy().starts_with(TEMPORARY)
+}
+
 /// Writes a file so that `path` holds either what it held before or all of what `write` writes.
 ///
 /// Missing parent directories are created. On any error the temporary file is removed.
@@ -21,7 +29,7 @@ pub fn write_atomically(
     let whole = || -> io::Result<()> {
         std::fs::create_dir_all(folder)?;
         let temporary = tempfile::Builder::new()
-            .prefix(".isomorph-")
+            .prefix(TEMPORARY)
             .tempfile_in(folder)?;
         let mut buffered = BufWriter::with_capacity(1 << 16, temporary.as_file());
         write(&mut buffered)?;

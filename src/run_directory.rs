@@ -8,6 +8,8 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use crate::atomic;
+
 /// Why a run's folder cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
@@ -49,7 +51,7 @@ impl RunDirectory {
             reason,
         };
         let occupied = match fs::read_dir(path) {
-            Ok(mut entries) => entries.next().is_some(),
+            Ok(entries) => holds_anything(entries),
             Err(error) if error.kind() == io::ErrorKind::NotFound => false,
             Err(reason) => return Err(io(reason)),
         };
@@ -64,7 +66,7 @@ impl RunDirectory {
             run.clear().map_err(io)?;
         }
         fs::create_dir_all(path).map_err(io)?;
-        crate::atomic::write_atomically(&run.recipe(), |out| out.write_all(recipe.as_bytes()))
+        atomic::write_atomically(&run.recipe(), |out| out.write_all(recipe.as_bytes()))
             .map_err(io)?;
         Ok(run)
     }
@@ -119,6 +121,19 @@ impl RunDirectory {
     }
 }
 
+/// Whether a folder holds anything but what a run leaves that was killed before it had written its recipe,
+/// and so is none yet; that is deleted.
+fn holds_anything(entries: fs::ReadDir) -> bool {
+    let (left_over, others): (Vec<_>, Vec<_>) = entries
+        .flatten()
+        .partition(|entry| atomic::is_left_over(&entry.file_name()));
+    for entry in left_over {
+        // Only unused space is at stake: not worth stopping for.
+        let _ = fs::remove_file(entry.path());
+    }
+    !others.is_empty()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -147,5 +162,14 @@ mod tests {
             RunDirectory::open(&path),
             Err(RunError::Missing(_))
         ));
+    }
+
+    #[test]
+    fn what_a_killed_run_left_of_its_recipe_is_no_run_and_goes() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let torn = folder.path().join(".isomorph-x1Y2z3");
+        fs::write(&torn, "half a rec").expect("written");
+        RunDirectory::create(folder.path(), "whole", false).expect("a new run");
+        assert!(!torn.exists(), "nothing torn is left");
     }
 }

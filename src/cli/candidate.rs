@@ -9,7 +9,7 @@ use isomorph_model::ModelBackend;
 
 use crate::evaluate::{Candidate, Carried, EvaluateError, Evaluation, Mesh, Purpose, Reference};
 use crate::shape::Normalisation;
-use crate::surface::extract::{Grid, GridError};
+use crate::surface::extract::{ExtractError, Grid, GridError};
 use crate::surface::frames::{FramesError, Surface, Trained};
 
 /// Cells along the longest side where a surface only serves to find the best times.
@@ -79,10 +79,15 @@ impl<B: ModelBackend> Candidate for Measured<'_, B> {
             Purpose::Aligning => &self.coarse,
             Purpose::Measured => &self.fine,
         };
-        let mesh = self.trained.surface_at(grid, time)?.mesh;
-        if mesh.triangles.is_empty() {
-            return Ok(None);
-        }
+        let mesh = match self.trained.surface_at(grid, time) {
+            Ok(found) => found.mesh,
+            // The field has one sign in the whole box: the surface has vanished.
+            Err(FramesError::Extract {
+                reason: ExtractError::NoSurface { .. },
+                ..
+            }) => return Ok(None),
+            Err(error) => return Err(error),
+        };
         let vertices = self.measured(mesh.vertices);
         Ok(Some(Mesh::of_points(&vertices, &mesh.triangles)))
     }

@@ -6,28 +6,24 @@
 //! WORK/fox_survey/0-18/quick/    its run, as `train` makes it
 //! ```
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-use std::time::Instant;
 
 use anyhow::{Context, Result};
 use clap::Args;
-use isomorph_model::TrainBackend;
 
-use super::candidate::{Ruler, measure};
+use super::compared::{Compared, Made, open_or_create};
 use super::evaluate::{PrecisionArgs, true_frame};
-use super::{BackendArgs, Ending, QuietArgs, SetArgs, stop_on_interrupt, trained};
-use crate::backend::{self, Task};
+use super::{BackendArgs, Ending, QuietArgs, SetArgs, Usage, stop_on_interrupt, trained};
+use crate::backend;
 use crate::compare::{
-    self, Entry, FramePair, Inputs, Lookup, Machine, MethodPlan, Network, Plan, Request, Store,
+    self, Entry, FramePair, Inputs, Lookup, Machine, MethodPlan, Plan, Request, Store,
 };
-use crate::evaluate::{Evaluation, GroundTruth, Options, Reference, Span};
-use crate::learner::checkpoint::{Checkpoint, CheckpointError};
-use crate::learner::{Learner, Outcome, settings};
+use crate::evaluate::{GroundTruth, Options, Reference, Span};
+use crate::learner::settings;
 use crate::recipe::{Preset, Recipe};
-use crate::report::Reporter;
-use crate::run_directory::RunDirectory;
+use crate::report::{Reporter, Verbosity};
 use crate::shape::{self, Normalisation, Pair};
 use crate::surface::write::{SurfaceFormat, SurfaceView, write_surface};
 
@@ -91,7 +87,8 @@ const OTHERS: [(&str, &[&str]); 7] = [
     ("nise-velocity", &["training.learning-rate=5e-4"]),
     // Coefficients of one size each: the steps can be larger than a network's.
     ("eigenbasis", &["training.velocity-learning-rate=1e-2"]),
-    ("nfgp", &[]),
+    // Its normalised layers learn slowly.
+    ("nfgp", &["training.velocity-learning-rate=3e-3"]),
 ];
 
 /// The words of `--methods`.
@@ -115,7 +112,7 @@ pub(super) fn run(args: CompareArgs) -> Result<Ending> {
     })?;
     backend::check(args.place.backend, args.place.device.as_deref())?;
     let bench = Bench {
-        store: Store::open(&args.output, &name)?,
+        store: Store::at(&args.output, &name),
         work: args.work.join(&name),
         sequence: content(&truth),
         options: args.precision.options(),
@@ -124,6 +121,7 @@ pub(super) fn run(args: CompareArgs) -> Result<Ending> {
         args,
     };
     bench.recipes(&plan)?;
+    bench.store.create()?;
     let mut entries = Vec::new();
     for pair in &plan.pairs {
         if bench.pair(&plan, *pair, &mut entries)? == Ending::Interrupted {
@@ -162,8 +160,26 @@ struct Bench {
 }
 
 impl Bench {
+    /// Tells the user something, unless only errors are wanted.
+    fn say(&self, text: &str) {
+        if self.args.quiet.verbosity() == Verbosity::Normal {
+            eprintln!("{text}");
+        }
+    }
+
     /// Reads every recipe of the plan: what is wrong with one is said before hours of training.
     fn recipes(&self, plan: &Plan) -> Result<()> {
+        let every = self.options.every;
+        for pair in &plan.pairs {
+            let between = pair.to - pair.from - 1;
+            if every > between {
+                return Err(Usage(format!(
+                    "--every {every}: pair {pair} has {between} frames between its ends; must be 1 to \
+                     {between}"
+                ))
+                .into());
+            }
+        }
         for method in &plan.methods {
             self.recipe(method, plan.pairs[0])
                 .with_context(|| format!("method {}", method.label))?;
@@ -207,11 +223,12 @@ impl Bench {
                     entries.push(*entry);
                     continue;
                 }
-                Lookup::Unusable { note } => eprintln!("note: {note}"),
+                Lookup::Unusable { note } => self.say(&format!("note: {note}")),
                 Lookup::Missing => {}
             }
-            eprintln!("{} {pair}: {}", plan.sequence, method.label);
+            self.say(&format!("{} {pair}: {}", plan.sequence, method.label));
             let shapes = shape::prepare(&settings::data(&recipe))?;
+            trained::check(&recipe, &shapes).with_context(|| format!("method {}", method.label))?;
             let truth = match &mut truth {
                 Some(known) => known,
                 none => none.insert(self.truth_of(pair)?),
@@ -333,86 +350,6 @@ struct Truth {
     span: Span,
     normalisation: Normalisation,
     reference: Arc<Reference>,
-}
-
-/// The run in a folder if it was made with this recipe, with its newest checkpoint; else a new one.
-fn open_or_create(path: &Path, recipe: &Recipe) -> Result<(RunDirectory, Option<Checkpoint>)> {
-    if let Ok(run) = RunDirectory::open(path)
-        && Recipe::read(&run.recipe(), &[]).is_ok_and(|before| before == *recipe)
-    {
-        match Checkpoint::newest(&run.checkpoints()) {
-            Ok(checkpoint) => return Ok((run, Some(checkpoint))),
-            Err(CheckpointError::None(_)) => return Ok((run, None)),
-            // Damaged: the run starts again.
-            Err(_) => {}
-        }
-    }
-    Ok((RunDirectory::create(path, &recipe.to_toml(), true)?, None))
-}
-
-/// What came out of one method on one pair.
-struct Made {
-    recipe: Recipe,
-    networks: Vec<Network>,
-    training_seconds: f64,
-    evaluation_seconds: f64,
-    evaluation: Evaluation,
-}
-
-/// One method on one pair, on whichever backend.
-struct Compared {
-    recipe: Recipe,
-    shapes: Pair,
-    run: RunDirectory,
-    checkpoint: Option<Checkpoint>,
-    reporter: Reporter,
-    reference: Arc<Reference>,
-    normalisation: Normalisation,
-    resolution: usize,
-    stop: Arc<AtomicBool>,
-}
-
-impl Task for Compared {
-    type Output = Result<Option<Made>>;
-
-    fn run<B: TrainBackend>(mut self, device: B::Device) -> Self::Output {
-        let frame = trained::Frame {
-            normalisation: self.shapes.normalisation,
-            bounds: self.shapes.bounds,
-        };
-        let (recipe, shapes) = (self.recipe.clone(), self.shapes);
-        let mut learner = match &self.checkpoint {
-            None => Learner::<B>::new(recipe, shapes, device.clone())?,
-            Some(checkpoint) => Learner::resume(recipe, shapes, device.clone(), checkpoint)?,
-        };
-        let mut emit = |event| self.reporter.handle(&event);
-        let outcome = learner.run(&self.run.checkpoints(), &self.stop, &mut emit)?;
-        if outcome == Outcome::Interrupted {
-            return Ok(None);
-        }
-        let clock = Instant::now();
-        let trained = trained::trained(learner.method(), &self.recipe, frame, device)?;
-        let ruler = Ruler {
-            reference: &self.reference,
-            normalisation: self.normalisation,
-            resolution: self.resolution,
-            stop: &self.stop,
-        };
-        let found = measure(&trained, &ruler)?;
-        let networks = learner.method().networks().into_iter();
-        Ok(found.map(|evaluation| Made {
-            networks: networks
-                .map(|(name, parameters)| Network {
-                    name: name.to_owned(),
-                    parameters,
-                })
-                .collect(),
-            training_seconds: learner.seconds(),
-            evaluation_seconds: clock.elapsed().as_secs_f64(),
-            recipe: self.recipe,
-            evaluation,
-        }))
-    }
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use clap::Args;
 
 use super::Ending;
 use crate::learner::checkpoint::{self, Checkpoint};
-use crate::recipe::Recipe;
+use crate::recipe::{MethodName, Recipe};
 use crate::run_directory::RunDirectory;
 use crate::shape::{self, Sequence, Shape};
 
@@ -103,20 +103,23 @@ fn run_info(path: &Path) -> Result<String> {
     )?;
     writeln!(text, "seconds      {:.1}", state.seconds)?;
     writeln!(text, "backend      {}", state.backend)?;
+    writeln!(text, "method       {}", recipe.method.name)?;
     writeln!(text, "preset       {}", recipe.preset)?;
     writeln!(text, "source       {}", recipe.data.source.display())?;
     writeln!(text, "target       {}", recipe.data.target.display())?;
-    let (f, v) = (&recipe.implicit, &recipe.velocity);
-    writeln!(
-        text,
-        "f            {} x {}, {}",
-        f.depth, f.width, f.activation
-    )?;
-    writeln!(
-        text,
-        "V            {} x {}, {}",
-        v.depth, v.width, v.activation
-    )?;
+    if recipe.method.name == MethodName::VelocityField {
+        let (f, v) = (&recipe.implicit, &recipe.velocity);
+        writeln!(
+            text,
+            "f            {} x {}, {}",
+            f.depth, f.width, f.activation
+        )?;
+        writeln!(
+            text,
+            "V            {} x {}, {}",
+            v.depth, v.width, v.activation
+        )?;
+    }
     let (centre, scale) = (state.normalisation.centre, state.normalisation.scale);
     writeln!(text, "normalised   (x - {centre:?}) * {scale}")?;
     Ok(text)

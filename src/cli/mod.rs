@@ -6,6 +6,7 @@
 mod bench;
 mod candidate;
 mod compare;
+mod compared;
 mod evaluate;
 mod extract;
 mod info;
@@ -23,6 +24,7 @@ use clap::{Args, Parser, Subcommand};
 
 use crate::backend::{BackendError, BackendName};
 use crate::compare::PlanError;
+use crate::evaluate::TruthError;
 use crate::recipe::RecipeError;
 use crate::report::Verbosity;
 use crate::run_directory::RunError;
@@ -136,6 +138,10 @@ fn is_usage(error: &anyhow::Error) -> bool {
             || cause.is::<Usage>()
             || cause.is::<PlanError>()
             || cause.is::<GridError>()
+            || matches!(
+                cause.downcast_ref::<TruthError>(),
+                Some(TruthError::Span { .. } | TruthError::Option { .. })
+            )
             || matches!(
                 cause.downcast_ref::<BackendError>(),
                 Some(BackendError::Absent(_) | BackendError::Device { .. })

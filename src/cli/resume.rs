@@ -9,6 +9,7 @@ use super::training::Training;
 use super::{BackendArgs, Ending, QuietArgs, SetArgs};
 use crate::atomic::write_atomically;
 use crate::backend;
+use crate::learner;
 use crate::learner::checkpoint::{Checkpoint, CheckpointError};
 use crate::learner::event::Event;
 use crate::learner::settings;
@@ -52,6 +53,10 @@ pub(super) fn run(args: ResumeArgs) -> Result<Ending> {
     };
     backend::check(args.place.backend, args.place.device.as_deref())?;
     let pair = shape::prepare(&settings::data(&recipe))?;
+    if let Some(checkpoint) = &checkpoint {
+        // Before anything is written: what is refused leaves the run as it was.
+        learner::fits(checkpoint, &recipe, &pair)?;
+    }
     let step = checkpoint
         .as_ref()
         .map_or(0, |checkpoint| checkpoint.state.step);
@@ -60,12 +65,12 @@ pub(super) fn run(args: ResumeArgs) -> Result<Ending> {
         let note = "no checkpoint yet: the run starts again from its first step";
         reporter.handle(&Event::Note(note.to_owned()))?;
     }
-    for change in changes.iter().filter(|change| !change.is_of_a_network()) {
+    for change in changes {
         reporter.handle(&Event::Note(format!(
             "changed since the checkpoint: {change}"
         )))?;
     }
-    if !args.set.overrides.is_empty() && !changes.iter().any(|change| change.is_of_a_network()) {
+    if !args.set.overrides.is_empty() {
         let text = recipe.to_toml();
         write_atomically(&run.recipe(), |out| out.write_all(text.as_bytes()))?;
     }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use clap::Args;
 
+use super::trained;
 use super::training::Training;
 use super::{BackendArgs, Ending, QuietArgs, SetArgs};
 use crate::backend;
@@ -48,6 +49,7 @@ pub(super) fn run(args: TrainArgs) -> Result<Ending> {
     // Before the run's folder exists: what cannot be read or opened leaves nothing behind.
     backend::check(args.place.backend, args.place.device.as_deref())?;
     let pair = shape::prepare(&settings::data(&recipe))?;
+    trained::check(&recipe, &pair)?;
     let path = args.run.unwrap_or_else(|| default_run(&args.recipe));
     let run = RunDirectory::create(&path, &recipe.to_toml(), args.force)?;
     let mut reporter = Reporter::new(&run, None, args.quiet.verbosity())?;

@@ -6,8 +6,8 @@ use isomorph_model::TrainBackend;
 use super::Usage;
 use crate::learner::checkpoint::Checkpoint;
 use crate::learner::method::{self, Method};
-use crate::recipe::Recipe;
-use crate::shape::{self, Bounds, Normalisation};
+use crate::recipe::{MethodName, Recipe};
+use crate::shape::{self, Bounds, Normalisation, Pair};
 use crate::surface::SurfaceMesh;
 use crate::surface::frames::{Surface, Trained};
 
@@ -39,6 +39,21 @@ pub(super) fn trained<B: TrainBackend>(
         bounds: frame.bounds.padded(recipe.training.box_margin as f32),
         device,
     })
+}
+
+/// Whether a pair has what the recipe's method needs, to be asked before there is a run.
+///
+/// # Errors
+/// A [`Usage`] that says what is missing and what to do.
+pub(super) fn check(recipe: &Recipe, pair: &Pair) -> Result<()> {
+    method::check(recipe, pair).map_err(Usage)?;
+    if matches!(
+        recipe.method.name,
+        MethodName::Eigenbasis | MethodName::Nfgp
+    ) {
+        template(recipe, &pair.normalisation)?;
+    }
+    Ok(())
 }
 
 /// The source's own mesh, normalised.

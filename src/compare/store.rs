@@ -84,19 +84,34 @@ struct Versions {
 }
 
 impl Store {
-    /// Opens the results of a sequence under the folder `results`, which is made if need be.
+    /// The results of a sequence under the folder `results`, which need not be there yet.
+    #[must_use]
+    pub fn at(results: &Path, sequence: &str) -> Self {
+        Self {
+            folder: results.join(file_stem(sequence)),
+            sequence: sequence.to_owned(),
+        }
+    }
+
+    /// Makes the folder, if need be.
+    ///
+    /// # Errors
+    /// [`StoreError::Io`].
+    pub fn create(&self) -> Result<(), StoreError> {
+        fs::create_dir_all(&self.folder).map_err(|error| {
+            io::Error::new(error.kind(), format!("{}: {error}", self.folder.display()))
+        })?;
+        Ok(())
+    }
+
+    /// The results of a sequence under the folder `results`, which is made if need be.
     ///
     /// # Errors
     /// [`StoreError::Io`] if the folder cannot be made.
     pub fn open(results: &Path, sequence: &str) -> Result<Self, StoreError> {
-        let folder = results.join(file_stem(sequence));
-        fs::create_dir_all(&folder).map_err(|error| {
-            io::Error::new(error.kind(), format!("{}: {error}", folder.display()))
-        })?;
-        Ok(Self {
-            folder,
-            sequence: sequence.to_owned(),
-        })
+        let store = Self::at(results, sequence);
+        store.create()?;
+        Ok(store)
     }
 
     /// The folder of the sequence.

@@ -43,9 +43,9 @@ impl GroundTruth {
         }
         let extension = path.extension().unwrap_or_default();
         if !extension.eq_ignore_ascii_case("anime") {
-            return Err(match path.exists() {
-                true => TruthError::NoSequence { path: path.into() },
-                false => unreadable(path, std::io::ErrorKind::NotFound.into()),
+            return Err(match path.metadata() {
+                Ok(_) => TruthError::NoSequence { path: path.into() },
+                Err(reason) => unreadable(path, reason),
             });
         }
         let sequence = Sequence::read(path)?;

@@ -33,7 +33,7 @@ use std::time::Instant;
 use burn::tensor::backend::Backend;
 use isomorph_model::{Objective, TrainBackend};
 
-use crate::recipe::Recipe;
+use crate::recipe::{Change, MethodName, Recipe};
 use crate::shape::Pair;
 use checkpoint::{Checkpoint, CheckpointError, State};
 use event::{Event, StepReport, TermReport};
@@ -123,20 +123,7 @@ impl<B: TrainBackend> Learner<B> {
         device: B::Device,
         checkpoint: &Checkpoint,
     ) -> Result<Self, LearnerError> {
-        let changes = checkpoint.recipe()?.changes(&recipe);
-        if let Some(change) = changes.iter().find(|change| change.is_of_a_network()) {
-            return Err(LearnerError::OtherNetworks(format!(
-                "{}: {} is {} in the checkpoint and {} in the recipe: a trained network cannot \
-                 change its shape; restore the value, or start a new run with `isomorph train`",
-                checkpoint.path.display(),
-                change.key,
-                change.before,
-                change.after
-            )));
-        }
-        if checkpoint.state.normalisation != pair.normalisation {
-            return Err(LearnerError::OtherShapes(checkpoint.path.clone()));
-        }
+        fits(checkpoint, &recipe, &pair)?;
         let mut learner = Self::new(recipe, pair, device)?;
         learner.method.restore(checkpoint)?;
         learner.step = checkpoint.state.step;
@@ -320,6 +307,49 @@ impl<B: TrainBackend> Learner<B> {
             correspondences: pair.correspondences.len(),
         }
     }
+}
+
+/// Whether training can go on from a checkpoint with this recipe and these shapes.
+///
+/// # Errors
+/// [`LearnerError::OtherNetworks`], [`LearnerError::OtherShapes`], and [`LearnerError::Checkpoint`] if the
+/// checkpoint's recipe no longer parses.
+pub fn fits(checkpoint: &Checkpoint, recipe: &Recipe, pair: &Pair) -> Result<(), LearnerError> {
+    if let Some(change) = fixed_change(&checkpoint.recipe()?, recipe) {
+        let why = if change.is_of_a_network() {
+            "a trained network cannot change its shape".to_owned()
+        } else {
+            format!(
+                "{} shares its steps out, so their number is fixed",
+                recipe.method.name
+            )
+        };
+        return Err(LearnerError::OtherNetworks(format!(
+            "{}: {} is {} in the checkpoint and {} in the recipe: {why}; restore the value, or \
+             start a new run with `isomorph train`",
+            checkpoint.path.display(),
+            change.key,
+            change.before,
+            change.after
+        )));
+    }
+    if checkpoint.state.normalisation != pair.normalisation {
+        return Err(LearnerError::OtherShapes(checkpoint.path.clone()));
+    }
+    Ok(())
+}
+
+/// The first change that a run cannot take once it has begun: one of its networks, or of the number of
+/// steps where the method shares them out among what it trains one after the other.
+fn fixed_change(before: &Recipe, after: &Recipe) -> Option<Change> {
+    let shares_steps = matches!(
+        before.method.name,
+        MethodName::Nise | MethodName::NiseVelocity | MethodName::Nfgp
+    );
+    let is_fixed = |change: &Change| {
+        change.is_of_a_network() || (shares_steps && change.key == "training.steps")
+    };
+    before.changes(after).into_iter().find(is_fixed)
 }
 
 /// Reads the terms of an objective back to the host.

@@ -13,6 +13,7 @@ type B = Autodiff<NdArray>;
 fn recipe(extra: &[&str]) -> Recipe {
     let text = "preset = \"quick\"\n[data]\nsource = \"a.ply\"\ntarget = \"b.ply\"\n";
     let small = [
+        "data.correspondences=same-vertices",
         "implicit.depth=2",
         "implicit.width=8",
         "velocity.depth=2",

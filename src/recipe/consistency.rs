@@ -46,11 +46,36 @@ impl Relation {
     }
 }
 
-/// Checks every relation between two keys of a complete recipe.
+/// A value that leaves some methods without what they learn from.
+struct Lack {
+    key: &'static str,
+    value: &'static str,
+    methods: &'static [&'static str],
+    /// What they do with what is lacking, and the cure.
+    need: &'static str,
+}
+
+const LACKS: [Lack; 2] = [
+    Lack {
+        key: "data.normals",
+        value: "none",
+        methods: &["lipmlp", "nfgp"],
+        need: "is trained on the normals of the shapes; set it to \"auto\"",
+    },
+    Lack {
+        key: "data.correspondences",
+        value: "none",
+        methods: &["eigenbasis", "nfgp"],
+        need: "is fitted to correspondences; name a file of pairs there",
+    },
+];
+
+/// Checks every relation between two keys of a complete recipe, and what its method needs.
 ///
 /// # Errors
 /// The first one that does not hold; the message begins with a value that the user gave.
 pub(super) fn check(entries: &Entries) -> Result<(), RecipeError> {
+    lacks(entries)?;
     for (first, relation, second) in RELATIONS {
         let (Some(one), Some(other)) = (entries.get(first), entries.get(second)) else {
             continue;
@@ -62,6 +87,27 @@ pub(super) fn check(entries: &Entries) -> Result<(), RecipeError> {
             Place::Preset(_) => conflict((second, other), relation.backwards(), (first, one)),
             _ => conflict((first, one), relation.forwards(), (second, other)),
         });
+    }
+    Ok(())
+}
+
+/// Whether the method has what it learns from.
+fn lacks(entries: &Entries) -> Result<(), RecipeError> {
+    let Some(method) = entries.get("method.name") else {
+        return Ok(());
+    };
+    let is = |entry: &Entry, word: &str| matches!(&entry.value, Value::Text(text) if text == word);
+    for lack in &LACKS {
+        if let Some(entry) = entries.get(lack.key)
+            && is(entry, lack.value)
+            && lack.methods.iter().any(|name| is(method, name))
+        {
+            return Err(RecipeError::Lacking {
+                at: entry.place.about(lack.key, &entry.value.to_string()),
+                method: method.value.to_string(),
+                need: lack.need,
+            });
+        }
     }
     Ok(())
 }

@@ -67,6 +67,16 @@ pub enum RecipeError {
         /// Where the other value comes from.
         place: String,
     },
+    /// The method has nothing to learn from.
+    #[error("{at}: the method {method} {need}, or choose another method.name")]
+    Lacking {
+        /// File, line, key and value, or override.
+        at: String,
+        /// The method, as TOML.
+        method: String,
+        /// What it does with what is lacking, and the cure.
+        need: &'static str,
+    },
     /// A key without which no recipe works.
     #[error("{}: {key} is missing ({allowed}); add it under [{section}]", path.display())]
     Missing {

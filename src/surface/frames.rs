@@ -146,6 +146,9 @@ pub fn write_frames<B: ModelBackend>(
     options: &FrameOptions,
     mut done: impl FnMut(&Frame) -> io::Result<bool>,
 ) -> Result<Vec<Frame>, FramesError> {
+    if options.carry.is_some() && trained.motion.is_none() {
+        return Err(no_motion());
+    }
     let grid = Grid::new(trained.bounds.min, trained.bounds.max, options.resolution)?;
     let listing = options.folder.join("frames.json");
     let earlier = take_listing(&listing)?;
@@ -175,6 +178,11 @@ pub fn write_frames<B: ModelBackend>(
         let _ = std::fs::remove_file(options.folder.join(stale));
     }
     Ok(frames)
+}
+
+fn no_motion() -> FramesError {
+    let text = "this method gives a surface and moves no points: leave --carry out";
+    FramesError::NoMotion(text.to_owned())
 }
 
 /// Reads and removes the listing of an earlier extraction; none, or not ours, is an empty one.
@@ -325,10 +333,7 @@ impl<B: ModelBackend> Trained<B> {
         start: &[[f32; 3]],
         times: &[f64],
     ) -> Result<Vec<Vec<[f32; 3]>>, FramesError> {
-        let motion = self.motion.as_ref().ok_or_else(|| {
-            let text = "this method gives a surface and moves no points: leave --carry out";
-            FramesError::NoMotion(text.to_owned())
-        })?;
+        let motion = self.motion.as_ref().ok_or_else(no_motion)?;
         let mut path = vec![Vec::with_capacity(start.len()); times.len()];
         for chunk in start.chunks(CHUNK) {
             let positions = motion.path(rows(chunk, &self.device), times);

@@ -2,13 +2,17 @@
 //! how to run them.
 
 mod backends;
+mod bad_comparisons;
 mod bad_recipes;
 mod bad_runs;
 mod bad_shapes;
 mod closed_forms;
+mod comparison;
+mod evaluation;
 mod extraction;
 mod golden;
 mod information;
+mod methods;
 mod outputs;
 mod resume;
 mod support;

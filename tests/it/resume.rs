@@ -207,7 +207,7 @@ fn what_a_torn_checkpoint_left_is_swept_away() {
 
 /// A run of a second or more that can be stopped in the middle.
 const LONGER: &[&str] = &[
-    "training.steps = 600",
+    "training.steps = 2000",
     "training.log-every = 3",
     "checkpoint.every = 25",
     "checkpoint.keep = 2",
@@ -279,10 +279,10 @@ fn a_run_killed_again_and_again_ends_in_the_same_networks() {
     assert!(killed >= 3, "killed {killed} times only");
     resume_on_one_thread(&place, "run", "flex");
     let run = place.run("run");
-    assert_eq!(run.logged_steps(), logged(600, 25));
+    assert_eq!(run.logged_steps(), logged(2000, 25));
     assert_eq!(
         run.checkpoints(),
-        ["step-000575", "step-000600"],
+        ["step-001975", "step-002000"],
         "nothing torn is left"
     );
     assert_same(&run, &whole);
@@ -349,7 +349,10 @@ fn an_interrupt_leaves_a_checkpoint_of_the_present_step_and_exits_130() {
         kill(Pid::from_raw(pid), signal).expect("a signal");
         assert_eq!(child.wait().expect("a child").code(), Some(130), "{signal}");
         let step = run.step();
-        assert!((1..600).contains(&step), "{signal}: stopped at step {step}");
+        assert!(
+            (1..2000).contains(&step),
+            "{signal}: stopped at step {step}"
+        );
         assert!(run.logged_steps().iter().all(|logged| *logged <= step));
         let log = fs::read_to_string(run.path("run.log")).expect("a log");
         assert!(

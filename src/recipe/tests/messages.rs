@@ -169,3 +169,20 @@ fn values_that_exclude_each_other_name_both_keys_and_lines() {
          \"default\"); change one of the two"
     );
 }
+
+#[test]
+fn what_a_method_lacks_is_told_with_the_cure() {
+    let refused = |overrides: &[&str]| {
+        let error = parsed(SHAPES, overrides).expect_err("refused");
+        error.to_string()
+    };
+    assert_eq!(
+        refused(&["method.name=lipmlp", "data.normals=none"]),
+        "--set data.normals=none: the method \"lipmlp\" is trained on the normals of the shapes; set it \
+         to \"auto\", or choose another method.name"
+    );
+    let text = refused(&["method.name=eigenbasis"]);
+    assert!(text.contains("data.correspondences = \"none\""), "{text}");
+    assert!(text.contains("name a file of pairs there"), "{text}");
+    assert!(parsed(SHAPES, &["method.name=lipmlp"]).is_ok());
+}

@@ -96,6 +96,12 @@ fn any_recipe() -> impl Strategy<Value = Recipe> {
         for path in [&mut recipe.data.source, &mut recipe.data.target] {
             *path = std::path::absolute(&*path).expect("it is not empty");
         }
+        if recipe.data.normals == NormalSource::None
+            || recipe.data.correspondences == Correspondences::None
+        {
+            // The method that needs neither.
+            recipe.method.name = MethodName::Mlp;
+        }
         if let Correspondences::File(path) = &mut recipe.data.correspondences {
             *path = std::path::absolute(&*path).expect("it is not empty");
         }
