@@ -4,11 +4,14 @@
     python3 scripts/gallery.py SEQUENCE.anime FROM TO --runs runs/compare/fox_survey/0-18 \\
         --methods quick,mlp,sdf-blend -o gallery.png [--binary PATH] [--columns 5]
 
-RUNS is where `isomorph compare` leaves a folder per method. The surfaces are extracted by `isomorph
-extract`; both ends are the given shapes and stand in every row. Needs numpy and matplotlib.
+RUNS is where `isomorph compare` leaves a folder per method; LABEL=FOLDER shows one under another
+name. The surfaces are extracted by `isomorph
+extract`; the first and the last column are the ends, which every method was given. Needs numpy and
+matplotlib, which brings Pillow.
 """
 
 import argparse
+import io
 import json
 import subprocess
 import sys
@@ -58,7 +61,7 @@ def extracted(binary: str, run: Path, times: np.ndarray) -> list[Mesh]:
 
 
 def view_of(meshes: list[Mesh]) -> np.ndarray:
-    """Right, up and towards the eye: along the axes of the shapes, widest to thinnest, turned a little."""
+    """Right, up and towards the eye: the axes of the shapes, widest to thinnest, turned a little."""
     points = np.concatenate([vertices for vertices, _ in meshes])
     wide, high, thin = np.argsort(-np.ptp(points, axis=0))
     # A figure is taller than wide: what stands up stays up if the widest axis is y.
@@ -87,9 +90,9 @@ def draw(axes, mesh: Mesh, view: np.ndarray, box: np.ndarray) -> None:
     light = np.array([0.35, 0.55, 0.76])
     shade = 0.3 + 0.7 * np.clip(normals[seen] @ light, 0, 1)[order]
     colours = np.outer(shade, [0.98, 0.78, 0.55])
-    axes.add_collection(
-        PolyCollection(corners[seen][order][:, :, :2], facecolors=colours, edgecolors=colours, linewidths=0.2)
-    )
+    outlines = corners[seen][order][:, :, :2]
+    look = {"facecolors": colours, "edgecolors": colours, "linewidths": 0.2}
+    axes.add_collection(PolyCollection(outlines, **look))
     axes.set_xlim(box[0, 0], box[1, 0])
     axes.set_ylim(box[0, 1], box[1, 1])
     axes.set_aspect("equal")
@@ -102,6 +105,7 @@ def gallery(rows: list[tuple[str, list[Mesh]]], times: np.ndarray, path: Path) -
 
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
+    from PIL import Image
 
     truth = rows[0][1]
     view = view_of(truth)
@@ -125,7 +129,12 @@ def gallery(rows: list[tuple[str, list[Mesh]]], times: np.ndarray, path: Path) -
         figure.text(0.005, (middle.y0 + middle.y1) / 2, label, va="center", fontsize=9)
     for axes, time in zip(grid[0], times):
         axes.set_title(f"t = {time:.2f}", fontsize=9)
-    figure.savefig(path, dpi=110, metadata={"Software": None})
+    picture = io.BytesIO()
+    figure.savefig(picture, dpi=110)
+    plt.close(figure)
+    # Shades of one colour: a palette takes a sixth of the bytes.
+    colours = Image.open(picture).convert("RGB").quantize(96)
+    colours.save(path, format="PNG", optimize=True)
 
 
 def main() -> int:
@@ -145,8 +154,9 @@ def main() -> int:
     times = (frames - from_) / (to - from_)
     rows = [("truth", true_meshes(sequence, (from_, to), times))]
     for method in given.methods.split(","):
-        rows.append((method, extracted(given.binary, given.runs / method, times)))
-        print(method, file=sys.stderr)
+        label, _, folder = method.partition("=")
+        rows.append((label, extracted(given.binary, given.runs / (folder or label), times)))
+        print(label, file=sys.stderr)
     gallery(rows, times, given.output)
     return 0
 
