@@ -112,7 +112,7 @@ impl<B: ModelBackend> Candidate for Measured<'_, B> {
 /// Measures a method against a reference, with a bar on the terminal; `None` if it was stopped.
 ///
 /// # Errors
-/// What keeps the method from being measured: a surface that is empty at some time, for one.
+/// What keeps the method from being measured: a field that is not finite, for one.
 pub(super) fn measure<B: ModelBackend>(
     trained: &Trained<B>,
     ruler: &Ruler,
