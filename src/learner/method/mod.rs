@@ -149,9 +149,7 @@ impl TrainingData {
             ]
         }))
     }
-}
 
-impl TrainingData {
     /// Neighbours among the points of the source; arranged on the first call.
     pub fn source_search(&self) -> &NeighbourSearch {
         self.source_search.get_or_init(|| {

@@ -4,6 +4,7 @@
 use std::io;
 
 use burn::module::Module;
+use isomorph_model::baseline::linear::straight_lines;
 use isomorph_model::baseline::nfgp::{
     FixedPoint, Nfgp, NfgpConfig, NfgpMotion, NfgpMotionConfig, NfgpSamples, NfgpWeights,
 };
@@ -84,11 +85,8 @@ impl<B: TrainBackend> Method<B> for Deformations<B> {
 
     fn objective(&self, data: &TrainingData, step: usize) -> Objective<B> {
         let (index, ..) = self.turn(step);
-        let time = self.done.net.time(index) as f32;
+        let time = self.done.net.time(index);
         let (handles, ends) = batch::draw_matched(&data.pair, &self.training, step);
-        let marks: Vec<[f32; 3]> = (handles.iter().zip(&ends))
-            .map(|(x0, x1)| std::array::from_fn(|axis| x0[axis] + time * (x1[axis] - x0[axis])))
-            .collect();
         let drawn = batch::draw_neighbours(
             &data.pair.source,
             data.source_search(),
@@ -98,7 +96,7 @@ impl<B: TrainBackend> Method<B> for Deformations<B> {
         let tensor = |points: &[[f32; 3]]| rows(points, &self.device);
         let samples = NfgpSamples {
             handles: tensor(&handles),
-            marks: tensor(&marks),
+            marks: straight_lines(tensor(&handles), tensor(&ends), time),
             points: tensor(&drawn.points),
             normals: tensor(&drawn.normals),
             neighbours: tensor(&drawn.neighbours),
