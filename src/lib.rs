@@ -20,3 +20,4 @@ pub mod run_directory;
 pub mod shape;
 pub mod surface;
 mod tensors;
+mod workers;

@@ -8,9 +8,10 @@
 //! The paper uses softplus (Section 4) and leaves beta open; the sine is that of SIREN (Sitzmann et
 //! al. 2020).
 
-use burn::tensor::{Tensor, TensorPrimitive};
+use burn::tensor::Tensor;
 
 use crate::backend::ModelBackend;
+use crate::softplus::{self, Lanes};
 
 /// An activation, applied to each element.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,37 +32,61 @@ impl Activation {
     /// `s(z)`.
     pub fn value<B: ModelBackend>(self, z: Tensor<B, 2>) -> Tensor<B, 2> {
         match self {
-            Self::Softplus { .. } => self.value_and_slope(z).0,
+            Self::Softplus { beta } => softplus::value_and_slope(z, beta).0,
             Self::Sine { omega } => (z * omega).sin(),
         }
     }
 
-    /// `s(z)` and `s'(z)`.
-    pub fn value_and_slope<B: ModelBackend>(self, z: Tensor<B, 2>) -> (Tensor<B, 2>, Tensor<B, 2>) {
+    /// `s(z + bias)` and `s'(z + bias)`.
+    ///
+    /// # Shapes
+    /// `z`: `[n, c]`; `bias`: `[1, c]`; results `[n, c]`.
+    pub fn value_and_slope<B: ModelBackend>(
+        self,
+        z: Tensor<B, 2>,
+        bias: Tensor<B, 2>,
+    ) -> (Tensor<B, 2>, Tensor<B, 2>) {
         match self {
-            Self::Softplus { beta } => {
-                let (value, slope) = B::softplus_and_slope(z.into_primitive().tensor(), beta);
-                let wrap = |primitive| Tensor::from_primitive(TensorPrimitive::Float(primitive));
-                (wrap(value), wrap(slope))
-            }
+            Self::Softplus { beta } => softplus_jet(z, bias, Lanes::VALUE, beta),
             Self::Sine { omega } => {
-                let angle = z * omega;
+                let angle = (z + bias) * omega;
                 (angle.clone().sin(), angle.cos() * omega)
             }
         }
     }
 
-    /// `s''(z)` from what [`Self::value_and_slope`] gave.
-    pub fn curvature<B: ModelBackend>(
+    /// The value, tangents and Laplacian that leave the activation where `z` enters it, all stacked as in
+    /// [`softplus`].
+    ///
+    /// # Shapes
+    /// `z` and the result: `[blocks n, c]`; `bias`: `[1, c]`.
+    pub fn jet<B: ModelBackend>(
         self,
-        value: Tensor<B, 2>,
-        slope: Tensor<B, 2>,
+        z: Tensor<B, 2>,
+        bias: Tensor<B, 2>,
+        lanes: Lanes,
     ) -> Tensor<B, 2> {
         match self {
-            Self::Softplus { beta } => (slope.clone() - slope.clone() * slope) * beta,
-            Self::Sine { omega } => value * (-omega * omega),
+            Self::Softplus { beta } => softplus_jet(z, bias, lanes, beta).0,
+            Self::Sine { omega } => {
+                let n = z.dims()[0] / lanes.blocks();
+                let (value, slope) = self.value_and_slope(softplus::block(&z, 0, n), bias);
+                let curvature = value.clone() * (-omega * omega);
+                softplus::pass(value, &slope, &curvature, &z, lanes)
+            }
         }
     }
+}
+
+fn softplus_jet<B: ModelBackend>(
+    z: Tensor<B, 2>,
+    bias: Tensor<B, 2>,
+    lanes: Lanes,
+    beta: f64,
+) -> (Tensor<B, 2>, Tensor<B, 2>) {
+    let (z, bias) = (softplus::primitive(z), softplus::primitive(bias));
+    let (out, slope) = B::softplus_jet(z, bias, lanes, beta);
+    (softplus::tensor(out), softplus::tensor(slope))
 }
 
 #[cfg(test)]
@@ -70,6 +95,11 @@ mod tests {
     use crate::testing::{Plain, Train, column, host};
 
     const INPUTS: [f64; 7] = [-1.0e4, -3.0, -0.01, 0.0, 0.02, 2.5, 1.0e4];
+
+    /// No bias.
+    fn none<B: ModelBackend>(columns: usize) -> Tensor<B, 2> {
+        Tensor::zeros([1, columns], &Default::default())
+    }
 
     /// Softplus in float64, written another way than the tensor code.
     fn softplus(z: f64, beta: f64) -> f64 {
@@ -85,7 +115,7 @@ mod tests {
         for beta in [1.0, 8.0, 100.0] {
             let inputs: Vec<f64> = (-200..200).map(|k| 0.1 * k as f64 / beta).collect();
             let z = column::<Plain>(&inputs);
-            let (value, slope) = Activation::Softplus { beta }.value_and_slope(z.clone());
+            let (value, slope) = Activation::Softplus { beta }.value_and_slope(z.clone(), none(1));
             for ((z, value), slope) in host(z).into_iter().zip(host(value)).zip(host(slope)) {
                 // f32 rounding of results up to 20 / beta, and of slopes up to 1.
                 assert!(
@@ -105,7 +135,7 @@ mod tests {
     fn softplus_is_exact_and_finite_far_out() {
         for beta in [1.0, 100.0] {
             let activation = Activation::Softplus { beta };
-            let (value, slope) = activation.value_and_slope(column::<Plain>(&INPUTS));
+            let (value, slope) = activation.value_and_slope(column::<Plain>(&INPUTS), none(1));
             for ((z, value), slope) in INPUTS.iter().zip(host(value)).zip(host(slope)) {
                 // f32 rounding of the result, relative for the large ones.
                 let wanted = softplus(*z, beta);
@@ -130,15 +160,18 @@ mod tests {
             Activation::Sine { omega: 3.0 },
         ] {
             let z = column::<Train>(&[-0.3, -0.02, 0.0, 0.15, 0.4]).require_grad();
-            let (value, slope) = activation.value_and_slope(z.clone());
-            let curvature = activation.curvature(value.clone(), slope.clone());
+            let (value, slope) = activation.value_and_slope(z.clone(), none(1));
+            let curvature = match activation {
+                Activation::Softplus { beta } => softplus::curvature(&slope, beta),
+                Activation::Sine { omega } => value.clone() * (-omega * omega),
+            };
             let by_value = z.grad(&value.sum().backward()).expect("value depends on z");
             // Both sides round the same f32 expressions: a few units in the last place.
             for (a, b) in host(by_value).iter().zip(host(slope.clone())) {
                 assert!((a - b).abs() < 1e-5, "{activation:?}: slope {a} and {b}");
             }
             let z = z.detach().require_grad();
-            let (_, again) = activation.value_and_slope(z.clone());
+            let (_, again) = activation.value_and_slope(z.clone(), none(1));
             let by_slope = z.grad(&again.sum().backward()).expect("slope depends on z");
             for (a, b) in host(by_slope).iter().zip(host(curvature)) {
                 assert!(

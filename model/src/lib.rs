@@ -30,6 +30,10 @@ pub mod activation;
 pub mod backend;
 pub mod baseline;
 pub mod encoding;
+#[cfg(any(feature = "ndarray", feature = "flex"))]
+mod gemm;
+#[cfg(any(feature = "ndarray", feature = "flex"))]
+mod host;
 mod implicit_net;
 mod initial;
 #[cfg(any(feature = "ndarray", feature = "flex"))]
@@ -39,6 +43,8 @@ mod mlp;
 mod morph;
 mod objective;
 pub mod operators;
+mod product;
+pub mod softplus;
 pub mod trajectory;
 mod velocity_net;
 
@@ -47,6 +53,7 @@ pub use implicit_net::{ImplicitNet, ImplicitNetConfig};
 pub use mlp::{Mlp, MlpConfig};
 pub use morph::{Geometry, Motion};
 pub use objective::{Objective, Term};
+pub use product::product;
 pub use velocity_net::{VelocityNet, VelocityNetConfig};
 
 #[cfg(test)]

@@ -13,6 +13,8 @@ use burn::tensor::{Tensor, TensorData};
 
 use crate::activation::Activation;
 use crate::backend::ModelBackend;
+use crate::product::product;
+use crate::softplus::Lanes;
 
 /// An affine layer, `x W + b`, of plain operations.
 ///
@@ -25,7 +27,7 @@ pub struct Dense<B: Backend> {
     pub bias: Param<Tensor<B, 2>>,
 }
 
-impl<B: Backend> Dense<B> {
+impl<B: ModelBackend> Dense<B> {
     /// `[n, inputs]` to `[n, outputs]`.
     pub fn forward(&self, x: Tensor<B, 2>) -> Tensor<B, 2> {
         self.linear(x) + self.bias.val()
@@ -33,12 +35,12 @@ impl<B: Backend> Dense<B> {
 
     /// `x W`: what a tangent passes through.
     pub fn linear(&self, x: Tensor<B, 2>) -> Tensor<B, 2> {
-        x.matmul(self.weight.val())
+        product(x, self.weight.val())
     }
 
     /// `g W^T`: what a cotangent passes back through, `[n, outputs]` to `[n, inputs]`.
     pub fn transposed(&self, g: Tensor<B, 2>) -> Tensor<B, 2> {
-        g.matmul(self.weight.val().transpose())
+        product(g, self.weight.val().transpose())
     }
 }
 
@@ -153,9 +155,8 @@ impl<B: ModelBackend> Mlp<B> {
     pub(crate) fn last_hidden(&self, input: Tensor<B, 2>) -> Tensor<B, 2> {
         let mut hidden = input.clone();
         for (k, layer) in self.hidden().iter().enumerate() {
-            hidden = self
-                .activation
-                .value(layer.forward(self.layer_input(k, hidden, &input)));
+            let z = layer.linear(self.layer_input(k, hidden, &input));
+            hidden = self.activation.jet(z, layer.bias.val(), Lanes::VALUE);
         }
         hidden
     }

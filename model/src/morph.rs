@@ -13,7 +13,7 @@ const DIFFERENCE: f64 = 2e-3;
 const STEPS_PER_TIME: f64 = 32.0;
 
 /// A surface that changes with time: the zero set of `f(., t)`, negative inside.
-pub trait Geometry<B: ModelBackend> {
+pub trait Geometry<B: ModelBackend>: Sync {
     /// `f(x, t)`.
     ///
     /// # Shapes
@@ -35,7 +35,7 @@ pub trait Geometry<B: ModelBackend> {
 }
 
 /// A map of space from one time to another: it carries points along with the surface.
-pub trait Motion<B: ModelBackend> {
+pub trait Motion<B: ModelBackend>: Sync {
     /// Where points that are at `x` at time `from` are at time `to`, `[n, 3]` to `[n, 3]`.
     fn carry(&self, x: Tensor<B, 2>, from: f64, to: f64) -> Tensor<B, 2>;
 

@@ -6,7 +6,7 @@ use anyhow::Result;
 use burn::tensor::backend::Backend;
 use burn::tensor::{Distribution, Tensor};
 use clap::{Args, ValueEnum};
-use isomorph_model::TrainBackend;
+use isomorph_model::{ModelBackend, TrainBackend, product};
 use serde::Serialize;
 
 use super::{BackendArgs, Ending};
@@ -126,7 +126,7 @@ impl Task for BenchArgs {
     type Output = Result<Measured>;
 
     fn run<B: TrainBackend>(self, device: B::Device) -> Self::Output {
-        let matmul_gflops = matmul_rate::<B::InnerBackend>(&device);
+        let matmul_gflops = product_rate::<B::InnerBackend>(&device);
         let derivatives = match self.derivatives {
             Way::Nested => "nested",
             Way::Forward => "forward",
@@ -180,7 +180,7 @@ fn measure<B: TrainBackend>(
 ) -> Result<PhaseCost> {
     let settings = Settings::new(&recipe);
     let pair = Pair::spheres(POINTS, CORRESPONDENCES);
-    let sizes = BatchSizes::new(&settings.training, pair.correspondences.len());
+    let sizes = BatchSizes::new(&settings.training, pair.correspondences.len(), 1);
     let gflop_per_step = flop::per_step(&settings, sizes, phase) / 1e9;
     let mut learner = Learner::<B>::new(recipe, pair, device.clone())?;
     let mut step = || {
@@ -202,14 +202,14 @@ fn measure<B: TrainBackend>(
 }
 
 /// GFLOP per second of a product of `4000 x 512` by `512 x 512`, the median of seven.
-fn matmul_rate<B: Backend>(device: &B::Device) -> f64 {
+fn product_rate<B: ModelBackend>(device: &B::Device) -> f64 {
     let matrix = |rows| Tensor::<B, 2>::random([rows, 512], Distribution::Default, device);
     let (a, b) = (matrix(4000), matrix(512));
     let multiply = || {
         let clock = Instant::now();
-        let product = a.clone().matmul(b.clone());
+        let c = product(a.clone(), b.clone());
         let _ = B::sync(device);
-        drop(product);
+        drop(c);
         clock.elapsed().as_secs_f64()
     };
     multiply();

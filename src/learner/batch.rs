@@ -36,24 +36,60 @@ pub struct BatchSizes {
 }
 
 impl BatchSizes {
-    /// The sizes that a recipe asks for, given how many correspondences there are.
-    pub fn new(training: &TrainingRecipe, correspondences: usize) -> Self {
+    /// The sizes that a recipe asks for, given how many correspondences there are; each the nearest
+    /// multiple of `parts`, so that equal parts of the batch hold all kinds in equal numbers.
+    pub fn new(training: &TrainingRecipe, correspondences: usize, parts: usize) -> Self {
         let ends = (training.batch * 2 / 11).max(1);
         let carried = (training.batch * 3 / 22).max(1);
         let collocation = training.batch - 2 * (ends + carried);
         let band = (collocation as f64 * training.band_share).round() as usize;
+        let whole = |count: usize| {
+            let multiple = (count + parts / 2) / parts * parts;
+            if count == 0 { 0 } else { multiple.max(parts) }
+        };
         Self {
-            ends,
-            carried,
-            band,
-            uniform: collocation - band,
-            matched: training.correspondence_batch.min(correspondences),
+            ends: whole(ends),
+            carried: whole(carried),
+            band: whole(band),
+            uniform: whole(collocation - band),
+            matched: whole(training.correspondence_batch.min(correspondences)),
+        }
+    }
+
+    /// The sizes of one of so many equal parts.
+    pub const fn part(self, parts: usize) -> Self {
+        Self {
+            ends: self.ends / parts,
+            carried: self.carried / parts,
+            band: self.band / parts,
+            uniform: self.uniform / parts,
+            matched: self.matched / parts,
         }
     }
 
     /// Points at which f is evaluated: all but the correspondences.
     pub const fn total(&self) -> usize {
         2 * self.ends + 2 * self.carried + self.band + self.uniform
+    }
+}
+
+/// One of the equal parts into which the samples of a step are divided.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Part {
+    /// Counted from 0.
+    pub index: usize,
+    /// How many there are, at least 1.
+    pub of: usize,
+}
+
+impl Part {
+    /// The whole.
+    pub const WHOLE: Self = Self { index: 0, of: 1 };
+
+    /// This part's share: every `of`-th row, so that the order of what is left stays as it was.
+    fn share<T: Copy>(self, rows: &[T]) -> Vec<T> {
+        let rows = rows.iter().skip(self.index).step_by(self.of);
+        rows.copied().collect()
     }
 }
 
@@ -66,6 +102,16 @@ pub struct Samples {
     pub normals: Vec<[f32; 3]>,
     /// `[n]`.
     pub times: Vec<f32>,
+}
+
+impl Samples {
+    fn part(&self, part: Part) -> Self {
+        Self {
+            points: part.share(&self.points),
+            normals: part.share(&self.normals),
+            times: part.share(&self.times),
+        }
+    }
 }
 
 /// The samples of one step.
@@ -83,6 +129,24 @@ pub struct Batch {
     pub uniform: Samples,
     /// Corresponding points, of the source and of the target.
     pub matched: (Vec<[f32; 3]>, Vec<[f32; 3]>),
+}
+
+impl Batch {
+    /// One of the equal parts of a batch whose sizes are multiples of their number
+    /// ([`BatchSizes::new`]).
+    ///
+    /// It has the shape of a batch of its own: the source is first, and row `k` of the offsets belongs to
+    /// carried row `k mod carried` of the part, because their number is a multiple too.
+    pub fn part(&self, part: Part) -> Self {
+        Self {
+            ends: self.ends.part(part),
+            starts: self.starts.part(part),
+            stops: part.share(&self.stops),
+            offsets: part.share(&self.offsets),
+            uniform: self.uniform.part(part),
+            matched: (part.share(&self.matched.0), part.share(&self.matched.1)),
+        }
+    }
 }
 
 /// The samples of `step`.
@@ -130,11 +194,22 @@ pub struct EndBatch {
     pub between: Vec<f32>,
 }
 
-/// The samples of `step` at both ends.
-pub fn draw_ends(pair: &Pair, training: &TrainingRecipe, step: usize) -> EndBatch {
+impl EndBatch {
+    /// One of the equal parts: as many of the source as of the target, the source first.
+    pub fn part(&self, part: Part) -> Self {
+        Self {
+            surface: self.surface.part(part),
+            space: self.space.part(part),
+            between: part.share(&self.between),
+        }
+    }
+}
+
+/// The samples of `step` at both ends, of each kind a multiple of `parts`.
+pub fn draw_ends(pair: &Pair, training: &TrainingRecipe, step: usize, parts: usize) -> EndBatch {
     let rng = &mut ChaCha8Rng::seed_from_u64(training.seed);
     rng.set_stream(step as u64 + 1);
-    let count = (training.batch / 4).max(1);
+    let count = (training.batch / 4 / parts).max(1) * parts;
     let band = (count as f64 * training.band_share).round() as usize;
     let bounds = pair.bounds.padded(training.box_margin as f32);
     let (mut surface, mut space) = (Samples::default(), Samples::default());

@@ -38,7 +38,12 @@ pub fn per_step(settings: &Settings, sizes: BatchSizes, phase: Phase) -> f64 {
     let collocation = (sizes.band + sizes.uniform) as f64;
 
     let with_normals = trains_f && loss.transported_normals > 0.0;
-    let constants = carried * evaluations * if with_normals { 2.0 } else { 1.0 };
+    let constants = match (with_normals, trains_v && trains_f) {
+        (true, _) => 2.0 * carried * evaluations,
+        // The tracked trajectories serve as constants as well.
+        (false, true) => 0.0,
+        (false, false) => carried * evaluations,
+    };
     let tracked = if trains_v {
         matched + if trains_f { carried } else { 0.0 }
     } else {

@@ -5,7 +5,8 @@
 //! | `method/` | what is trained: our method and those that it is compared with |
 //! | `settings.rs` | the recipe in the model's types |
 //! | `schedule.rs` | our method's phases, ramp and learning rates by step |
-//! | `batch.rs` | the samples of a step, on the host |
+//! | `batch.rs` | the samples of a step, on the host, and their equal parts |
+//! | `posed.rs` | the objective of a part, its terms and its gradients |
 //! | `step.rs` | the objective of a step of our method, on the device |
 //! | `optimiser.rs` | Adam with a limited gradient |
 //! | `checkpoint.rs` | whole checkpoints or none |
@@ -22,6 +23,7 @@ pub mod flop;
 pub mod memory;
 pub mod method;
 mod optimiser;
+pub mod posed;
 pub mod schedule;
 pub mod settings;
 pub mod step;
@@ -31,13 +33,16 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use burn::tensor::backend::Backend;
-use isomorph_model::{Objective, TrainBackend};
+use isomorph_model::TrainBackend;
 
 use crate::recipe::{Change, MethodName, Recipe};
 use crate::shape::Pair;
+use crate::workers::Workers;
+use batch::Part;
 use checkpoint::{Checkpoint, CheckpointError, State};
 use event::{Event, StepReport, TermReport};
 use method::{Method, TrainingData};
+use posed::Slopes;
 
 /// Why training stopped before its last step.
 #[derive(Debug, thiserror::Error)]
@@ -203,13 +208,16 @@ impl<B: TrainBackend> Learner<B> {
 
     /// One step of the optimisers; the unweighted terms with their weights if `read` asks for them.
     pub fn advance(&mut self, read: bool) -> Option<Vec<TermReport>> {
-        let objective = self.method.objective(&self.data, self.step);
-        let report = read.then(|| term_reports(&objective));
-        if let Some(total) = objective.total() {
-            self.method.descend(self.step, &mut total.backward());
-        }
+        let parts = self.method.parts();
+        let (method, data, step) = (&*self.method, &self.data, self.step);
+        let done = Workers::shared().map(parts, |index| {
+            let part = Part { index, of: parts };
+            method.objective(data, step, part).solve(parts, read)
+        });
+        let (reports, gradients): (Vec<_>, Vec<_>) = done.into_iter().unzip();
+        self.method.descend(step, &mut Slopes::new(gradients));
         self.step += 1;
-        report
+        read.then(|| posed::mean_of(&reports))
     }
 
     fn is_logged(&self, done: usize) -> bool {
@@ -350,18 +358,6 @@ fn fixed_change(before: &Recipe, after: &Recipe) -> Option<Change> {
         change.is_of_a_network() || (shares_steps && change.key == "training.steps")
     };
     before.changes(after).into_iter().find(is_fixed)
-}
-
-/// Reads the terms of an objective back to the host.
-fn term_reports<B: Backend>(objective: &Objective<B>) -> Vec<TermReport> {
-    let terms = objective.terms().iter().zip(objective.read());
-    terms
-        .map(|(term, raw)| TermReport {
-            name: term.name,
-            raw,
-            weighted: raw * term.weight,
-        })
-        .collect()
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use burn::module::{AutodiffModule, ModuleVisitor, Param};
 use burn::optim::adaptor::OptimizerAdaptor;
-use burn::optim::{Adam, AdamConfig, GradientsParams, Optimizer};
+use burn::optim::{Adam, AdamConfig, GradientsAccumulator, GradientsParams, Optimizer};
 use burn::tensor::Tensor;
 use burn::tensor::backend::AutodiffBackend;
 use isomorph_model::TrainBackend;
@@ -15,7 +15,8 @@ pub fn adam<B: TrainBackend, M: AutodiffModule<B>>() -> AdamOf<M, B> {
     AdamConfig::new().with_epsilon(1e-8).init()
 }
 
-/// One step of the optimiser; the gradient is scaled down to the norm `clip` where it is longer.
+/// One step of the optimiser against the sum of the gradients of a batch's parts, which is scaled down to
+/// the norm `clip` where it is longer.
 ///
 /// `clip = 0` never scales. The norm stays on the device: nothing is read back.
 ///
@@ -23,11 +24,15 @@ pub fn adam<B: TrainBackend, M: AutodiffModule<B>>() -> AdamOf<M, B> {
 pub fn advance<B: TrainBackend, M: AutodiffModule<B>>(
     optimiser: &mut AdamOf<M, B>,
     net: M,
-    gradients: &mut B::Gradients,
+    parts: Vec<GradientsParams>,
     rate: f64,
     clip: f64,
 ) -> M {
-    let mut params = GradientsParams::from_module(gradients, &net);
+    let mut sum = GradientsAccumulator::new();
+    for part in parts {
+        sum.accumulate(&net, part);
+    }
+    let mut params = sum.grads();
     if clip > 0.0 {
         let mut squares = Squares {
             gradients: &params,

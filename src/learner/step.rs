@@ -68,10 +68,13 @@ impl<B: TrainBackend> Step<'_, B> {
     /// Carries the starts to their stops; in the phases that train `V` its trajectories are tracked, and
     /// the correspondences travel along.
     fn carry(&self, batch: &Batch, objective: &mut Objective<B>) -> Carried<B> {
-        let (still, normals) = self.carry_constants(batch);
         let tracked = match self.phase {
             Phase::ImplicitOnly => None,
             _ => self.carry_tracked(batch, objective),
+        };
+        let (still, normals) = match &tracked {
+            Some(positions) if !self.carries_normals(batch) => (positions.clone().inner(), None),
+            _ => self.carry_constants(batch),
         };
         Carried {
             positions: tracked.unwrap_or_else(|| Tensor::from_inner(still.clone())),
@@ -117,6 +120,12 @@ impl<B: TrainBackend> Step<'_, B> {
         joint.then(|| arrived.slice([2 * matched..x.len(), 0..3]))
     }
 
+    fn carries_normals(&self, batch: &Batch) -> bool {
+        self.phase != Phase::WarmUp
+            && self.settings.loss.transported_normals > 0.0
+            && batch.starts.normals.len() == batch.starts.points.len()
+    }
+
     /// The same trajectories without a graph, with the normals where they are wanted.
     fn carry_constants(&self, batch: &Batch) -> (Tensor<B::InnerBackend, 2>, Option<Tensor<B, 2>>) {
         let settings = self.settings;
@@ -125,10 +134,7 @@ impl<B: TrainBackend> Step<'_, B> {
         let from = column::<B::InnerBackend>(&batch.starts.times, self.device);
         let to = column::<B::InnerBackend>(&batch.stops, self.device);
         let (steps, integrator) = (settings.steps, settings.integrator);
-        let wanted = self.phase != Phase::WarmUp
-            && settings.loss.transported_normals > 0.0
-            && batch.starts.normals.len() == batch.starts.points.len();
-        if wanted {
+        if self.carries_normals(batch) {
             let n = rows::<B::InnerBackend>(&batch.starts.normals, self.device);
             let operators = &settings.derivatives;
             let (x, n) = transport(operators, &v, x, n, from, to, steps, integrator);

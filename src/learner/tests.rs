@@ -2,6 +2,8 @@
 
 use std::sync::atomic::AtomicBool;
 
+use burn::module::ParamId;
+use burn::optim::GradientsParams;
 use burn_autodiff::Autodiff;
 use burn_ndarray::NdArray;
 
@@ -46,7 +48,7 @@ fn learner(extra: &[&str]) -> Learner<B> {
 #[test]
 fn a_batch_is_a_function_of_seed_and_step_alone() {
     let (pair, recipe) = (pair(), recipe(&[]));
-    let sizes = BatchSizes::new(&recipe.training, pair.correspondences.len());
+    let sizes = BatchSizes::new(&recipe.training, pair.correspondences.len(), 1);
     assert_eq!(sizes.total(), recipe.training.batch);
     let at = |step| draw(&pair, &recipe.training, sizes, step);
     assert_eq!(at(17), at(17));
@@ -60,7 +62,7 @@ fn a_batch_is_a_function_of_seed_and_step_alone() {
 fn a_batch_has_the_sizes_and_ranges_that_it_says() {
     for times in ["random", "grid"] {
         let (pair, recipe) = (pair(), recipe(&[&format!("training.times={times}")]));
-        let sizes = BatchSizes::new(&recipe.training, pair.correspondences.len());
+        let sizes = BatchSizes::new(&recipe.training, pair.correspondences.len(), 1);
         let batch = draw(&pair, &recipe.training, sizes, 3);
         assert_eq!(batch.ends.points.len(), 2 * sizes.ends);
         assert_eq!(batch.ends.normals.len(), 2 * sizes.ends);
@@ -86,6 +88,84 @@ fn a_batch_has_the_sizes_and_ranges_that_it_says() {
         };
         assert!(batch.uniform.points.iter().all(inside));
     }
+}
+
+#[test]
+fn the_parts_of_a_step_add_up_to_the_whole() {
+    // As drawn for 88 points and 8 correspondences, all numbers are even.
+    let of = 2;
+    for name in ["velocity-field", "mlp", "sdf-blend", "lipmlp", "nise"] {
+        let learner = learner(&[
+            &format!("method.name={name}"),
+            "training.warm-up=0",
+            "training.ramp-until=0",
+        ]);
+        let solve = |part: Part| {
+            learner
+                .method
+                .objective(&learner.data, 5, part)
+                .solve(part.of, true)
+        };
+        let (whole, gradients) = solve(Part::WHOLE);
+        let (terms, parts): (Vec<_>, Vec<_>) =
+            (0..of).map(|index| solve(Part { index, of })).unzip();
+        for (whole, sum) in whole.iter().zip(posed::mean_of(&terms)) {
+            assert_eq!(whole.name, sum.name);
+            // Means of some dozen f32 of the size of the term, in another order.
+            let off = (whole.raw - sum.raw).abs();
+            assert!(
+                off <= 1e-5 * whole.raw.abs().max(1e-3),
+                "{name}, {}: {whole:?} and {sum:?}",
+                whole.name
+            );
+        }
+        for network in 0..gradients.len() {
+            let read = |params: &GradientsParams| {
+                let first = params
+                    .get::<NdArray, 2>(ParamId::from(1))
+                    .expect("of the first layer");
+                first.into_data().to_vec::<f32>().expect("f32")
+            };
+            let whole = read(&gradients[network]);
+            let mut sum = vec![0.0; whole.len()];
+            for part in &parts {
+                sum.iter_mut()
+                    .zip(read(&part[network]))
+                    .for_each(|(sum, value)| *sum += value);
+            }
+            let size = whole
+                .iter()
+                .fold(0.0f32, |most, value| most.max(value.abs()));
+            assert!(size > 0.0, "{name}: the first layer has a gradient");
+            for (whole, sum) in whole.iter().zip(sum) {
+                // Cancelling sums of f32 as large as the weighted terms.
+                assert!(
+                    (whole - sum).abs() <= 1e-3 * size,
+                    "{name}: {whole} and {sum} of {size}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn large_batches_are_divided_on_a_processor_alone() {
+    let parts = |batch: usize, width: usize| {
+        let set = [
+            format!("training.batch={batch}"),
+            format!("implicit.width={width}"),
+        ];
+        learner(&[&set[0], &set[1]]).method.parts()
+    };
+    // 88 x 8 values of 4 bytes fit into a quarter of a megabyte, 2200 x 128 take more than four of these.
+    assert_eq!(parts(88, 8), 1);
+    assert_eq!(parts(2200, 128), 8);
+    assert_eq!(parts(4000, 512), 32);
+    #[cfg(feature = "wgpu")]
+    assert_eq!(
+        <burn_wgpu::Wgpu as isomorph_model::ModelBackend>::LAYER_BYTES,
+        None
+    );
 }
 
 /// Trains in a folder until done or until `stop_after` steps; the events.

@@ -20,9 +20,13 @@ use super::write::{SurfaceFormat, SurfaceView, WriteError, write_surface};
 use crate::atomic::write_atomically;
 use crate::shape::{self, Bounds, Normalisation, ShapeError};
 use crate::tensors::rows;
+use crate::workers::Workers;
 
-/// Points per evaluation of a network: enough to fill two cores, small enough to stay in their caches.
-const CHUNK: usize = 8192;
+/// Points per evaluation of a network by one core: the values of a layer of 128 stay in its cache.
+const HOST_CHUNK: usize = 1024;
+
+/// Points per evaluation on a device where larger batches are only better.
+const DEVICE_CHUNK: usize = 1 << 16;
 
 /// What was trained and the frame that it lives in.
 pub struct Trained<B: Backend> {
@@ -272,11 +276,11 @@ impl<B: ModelBackend> Trained<B> {
             }
         };
         let field = |points: &[[f32; 3]]| {
-            let values = in_chunks(points, &self.device, |x| {
-                let t = Tensor::full([x.dims()[0], 1], time, &self.device);
-                geometry.value(x, t)
+            let values = in_chunks::<B, _>(points, |chunk| {
+                let t = Tensor::full([chunk.len(), 1], time, &self.device);
+                host(geometry.value(rows(chunk, &self.device), t))
             });
-            Ok::<_, Infallible>(values)
+            Ok::<_, Infallible>(values.concat())
         };
         let found = extract(field, grid).map_err(|reason| FramesError::Extract { time, reason })?;
         Ok(Found {
@@ -316,12 +320,12 @@ impl<B: ModelBackend> Trained<B> {
         let Surface::Field(geometry) = &self.shape else {
             return None;
         };
-        let flat = in_chunks(points, &self.device, |x| {
-            let t = Tensor::full([x.dims()[0], 1], time, &self.device);
-            let gradient = geometry.gradient(x, t);
-            Tensor::cat(vec![gradient.clone(), length(gradient)], 1)
+        let pieces = in_chunks::<B, _>(points, |chunk| {
+            let t = Tensor::full([chunk.len(), 1], time, &self.device);
+            let gradient = geometry.gradient(rows(chunk, &self.device), t);
+            host(Tensor::cat(vec![gradient.clone(), length(gradient)], 1))
         });
-        Some(flat.as_chunks::<4>().0.to_vec())
+        Some(pieces.concat().as_chunks::<4>().0.to_vec())
     }
 
     /// Positions at ascending times of points that are at `start` at time 0, normalised.
@@ -334,12 +338,14 @@ impl<B: ModelBackend> Trained<B> {
         times: &[f64],
     ) -> Result<Vec<Vec<[f32; 3]>>, FramesError> {
         let motion = self.motion.as_ref().ok_or_else(no_motion)?;
-        let mut path = vec![Vec::with_capacity(start.len()); times.len()];
-        for chunk in start.chunks(CHUNK) {
+        let pieces = in_chunks::<B, _>(start, |chunk| {
             let positions = motion.path(rows(chunk, &self.device), times);
-            for (whole, part) in path.iter_mut().zip(positions) {
-                let flat: Vec<f32> = part.into_data().iter::<f32>().collect();
-                whole.extend_from_slice(flat.as_chunks::<3>().0);
+            positions.into_iter().map(host).collect::<Vec<_>>()
+        });
+        let mut path = vec![Vec::with_capacity(start.len()); times.len()];
+        for piece in pieces {
+            for (whole, part) in path.iter_mut().zip(piece) {
+                whole.extend_from_slice(part.as_chunks::<3>().0);
             }
         }
         Ok(path)
@@ -384,17 +390,19 @@ fn carry<B: ModelBackend>(
     Ok(names)
 }
 
-/// Evaluates `map` on points, a chunk at a time, and reads the results back.
-fn in_chunks<B: ModelBackend>(
+/// Evaluates `map` on points, a chunk at a time, on a processor on all of its cores.
+fn in_chunks<B: ModelBackend, T: Send>(
     points: &[[f32; 3]],
-    device: &B::Device,
-    map: impl Fn(Tensor<B, 2>) -> Tensor<B, 2>,
-) -> Vec<f32> {
-    let values = points.chunks(CHUNK).flat_map(|chunk| {
-        map(rows::<B>(chunk, device))
-            .into_data()
-            .iter::<f32>()
-            .collect::<Vec<_>>()
-    });
-    values.collect()
+    map: impl Fn(&[[f32; 3]]) -> T + Sync,
+) -> Vec<T> {
+    if B::LAYER_BYTES.is_none() {
+        return points.chunks(DEVICE_CHUNK).map(map).collect();
+    }
+    let chunks: Vec<_> = points.chunks(HOST_CHUNK).collect();
+    Workers::shared().map(chunks.len(), |k| map(chunks[k]))
+}
+
+/// The values of a tensor, row by row.
+fn host<B: Backend>(tensor: Tensor<B, 2>) -> Vec<f32> {
+    tensor.into_data().iter::<f32>().collect()
 }

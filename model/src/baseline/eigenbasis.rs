@@ -34,6 +34,7 @@ use crate::backend::ModelBackend;
 use crate::loss;
 use crate::morph::{Motion, follow};
 use crate::objective::Objective;
+use crate::product::product;
 use crate::trajectory::{Integrator, Steps, integrate};
 
 /// A quarter of the dimension: the exponent of the eigenvalue in a mode's standard deviation.
@@ -117,7 +118,7 @@ impl<B: ModelBackend> Eigenbasis<B> {
     /// `x`: `[n, 3]`, normalised, inside the padded box (outside `V` goes on as its mirror image); result
     /// `[n, 3]`, normalised units per unit of time.
     pub fn velocity(&self, x: Tensor<B, 2>) -> Tensor<B, 2> {
-        self.derivatives(x).matmul(self.mixing())
+        product(self.derivatives(x), self.mixing())
     }
 
     /// The terms "matching" and "prior"; `x0` and `x1`: corresponding points at t = 0 and t = 1, `[n, 3]`.
@@ -132,7 +133,7 @@ impl<B: ModelBackend> Eigenbasis<B> {
             let from = Tensor::zeros([x0.dims()[0], 1], &x0.device());
             let to = from.ones_like();
             let mixing = self.mixing();
-            let rhs = |x, _| self.derivatives(x).matmul(mixing.clone());
+            let rhs = |x, _| product(self.derivatives(x), mixing.clone());
             let arrived = integrate(rhs, x0, from, to, self.steps, self.integrator);
             loss::matching::matching(arrived, x1, weights.robust_scale)
         });
@@ -212,7 +213,7 @@ impl<B: ModelBackend> Motion<B> for Eigenbasis<B> {
     fn carry(&self, x: Tensor<B, 2>, from: f64, to: f64) -> Tensor<B, 2> {
         let mixing = self.mixing();
         follow(
-            |x, _| self.derivatives(x).matmul(mixing.clone()),
+            |x, _| product(self.derivatives(x), mixing.clone()),
             x,
             from,
             to,

@@ -41,6 +41,7 @@ use crate::activation::Activation;
 use crate::backend::ModelBackend;
 use crate::morph::Geometry;
 use crate::objective::Objective;
+use crate::product::product;
 
 /// Standard deviation of the first layer's weights for the position, in radians per normalised unit.
 const BANDWIDTH: f64 = 4.0;
@@ -157,7 +158,7 @@ impl<B: ModelBackend> LipschitzLayer<B> {
 
     /// `[n, inputs]` to `[n, outputs]`.
     fn forward(&self, input: Tensor<B, 2>, space_scale: f64) -> Tensor<B, 2> {
-        input.matmul(self.bounded(space_scale)) + self.bias.val()
+        product(input, self.bounded(space_scale)) + self.bias.val()
     }
 }
 

@@ -65,8 +65,8 @@ fn value_and_pullback<B: ModelBackend>(
     let mut hidden = input.clone();
     let mut slopes = Vec::with_capacity(mlp.hidden().len());
     for (k, layer) in mlp.hidden().iter().enumerate() {
-        let z = layer.forward(mlp.layer_input(k, hidden, &input));
-        let (value, slope) = mlp.activation().value_and_slope(z);
+        let z = layer.linear(mlp.layer_input(k, hidden, &input));
+        let (value, slope) = mlp.activation().value_and_slope(z, layer.bias.val());
         slopes.push(slope);
         hidden = value;
     }

@@ -6,12 +6,13 @@ use std::io;
 use burn::module::Module;
 use isomorph_model::baseline::eigenbasis::{Eigenbasis, EigenbasisConfig, EigenbasisWeights};
 use isomorph_model::trajectory::{Integrator, Steps};
-use isomorph_model::{Geometry, Motion, Objective, TrainBackend};
+use isomorph_model::{Geometry, Motion, TrainBackend};
 
 use super::{Method, Rates, Records, Trainee, TrainingData};
-use crate::learner::batch;
+use crate::learner::batch::{self, Part};
 use crate::learner::checkpoint::{Checkpoint, CheckpointError};
 use crate::learner::event::Phase;
+use crate::learner::posed::{Posed, Slopes};
 use crate::learner::schedule::Schedule;
 use crate::recipe::{Recipe, TrainingRecipe};
 use crate::shape::Bounds;
@@ -71,15 +72,16 @@ impl<B: TrainBackend> Method<B> for Flow<B> {
         }
     }
 
-    fn objective(&self, data: &TrainingData, step: usize) -> Objective<B> {
+    fn objective(&self, data: &TrainingData, step: usize, _: Part) -> Posed<B> {
         let (from, to) = batch::draw_matched(&data.pair, &self.training, step);
         let (x0, x1) = (rows(&from, &self.device), rows(&to, &self.device));
-        self.net.net.objective(x0, x1, &self.weights)
+        let net = self.net.replica();
+        Posed::new(net.objective(x0, x1, &self.weights)).by(net)
     }
 
-    fn descend(&mut self, step: usize, gradients: &mut B::Gradients) {
+    fn descend(&mut self, step: usize, slopes: &mut Slopes) {
         let rate = self.rates(step).velocity;
-        self.net.advance(gradients, rate, self.training.clip);
+        self.net.advance(slopes.take(0), rate, self.training.clip);
     }
 
     fn networks(&self) -> Vec<(&'static str, usize)> {

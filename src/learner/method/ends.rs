@@ -10,10 +10,11 @@ use isomorph_model::baseline::lipmlp::{LipMlp, LipMlpConfig};
 use isomorph_model::baseline::mlp::{PlainMlp, PlainMlpConfig};
 use isomorph_model::{Geometry, Motion, Objective, TrainBackend};
 
-use super::{Method, Rates, Records, Trainee, TrainingData};
-use crate::learner::batch::{self, EndBatch};
+use super::{Method, Rates, Records, Trainee, TrainingData, parts};
+use crate::learner::batch::{self, EndBatch, Part};
 use crate::learner::checkpoint::{Checkpoint, CheckpointError};
 use crate::learner::event::Phase;
+use crate::learner::posed::{Posed, Slopes};
 use crate::learner::schedule::Schedule;
 use crate::learner::settings::Settings;
 use crate::recipe::{LossRecipe, Recipe};
@@ -21,7 +22,7 @@ use crate::tensors::{column, rows};
 
 /// A network that knows what its step at the ends minimises.
 pub(super) trait EndNet<B: TrainBackend>:
-    AutodiffModule<B, InnerModule: Geometry<B::InnerBackend> + 'static>
+    AutodiffModule<B, InnerModule: Geometry<B::InnerBackend> + 'static> + Sync + 'static
 {
     /// The network as the recipe's seed makes it.
     fn new(recipe: &Recipe, settings: &Settings, device: &B::Device) -> Self;
@@ -80,15 +81,21 @@ impl<B: TrainBackend, M: EndNet<B>> Method<B> for EndFit<B, M> {
         }
     }
 
-    fn objective(&self, data: &TrainingData, step: usize) -> Objective<B> {
-        let drawn = Drawn::new(data, &self.settings, step, M::DISTANCES, &self.device);
-        self.net.net.terms(&self.recipe, &self.settings, &drawn)
+    fn parts(&self) -> usize {
+        parts::<B>(&self.settings)
     }
 
-    fn descend(&mut self, step: usize, gradients: &mut B::Gradients) {
+    fn objective(&self, data: &TrainingData, step: usize, part: Part) -> Posed<B> {
+        let device = &self.device;
+        let drawn = Drawn::new(data, &self.settings, step, part, M::DISTANCES, device);
+        let net = self.net.replica();
+        Posed::new(net.terms(&self.recipe, &self.settings, &drawn)).by(net)
+    }
+
+    fn descend(&mut self, step: usize, slopes: &mut Slopes) {
         let rate = self.rates(step).implicit;
-        self.net
-            .advance(gradients, rate, self.settings.training.clip);
+        let clip = self.settings.training.clip;
+        self.net.advance(slopes.take(0), rate, clip);
     }
 
     fn networks(&self) -> Vec<(&'static str, usize)> {
@@ -180,10 +187,11 @@ impl<B: TrainBackend> Drawn<B> {
         data: &TrainingData,
         settings: &Settings,
         step: usize,
+        part: Part,
         distances: bool,
         device: &B::Device,
     ) -> Self {
-        let batch = batch::draw_ends(&data.pair, &settings.training, step);
+        let batch = batch::draw_ends(&data.pair, &settings.training, step, part.of).part(part);
         let known = if distances { data.distances() } else { None };
         let distances = known.map_or_else(Vec::new, |known| {
             let points = batch.space.points.iter().zip(&batch.space.times);

@@ -17,16 +17,19 @@ mod nfgp;
 mod nise;
 mod velocity_field;
 
-use std::cell::OnceCell;
 use std::io;
+use std::sync::OnceLock;
 
 use burn::module::AutodiffModule;
-use burn::optim::Optimizer;
-use isomorph_model::{Geometry, Motion, Objective, TrainBackend};
+use burn::optim::{GradientsParams, Optimizer};
+use isomorph_model::{Geometry, Motion, TrainBackend};
 
+use super::batch::Part;
 use super::checkpoint::{self, Checkpoint, CheckpointError};
 use super::event::Phase;
 use super::optimiser::{self, AdamOf};
+use super::posed::{Posed, Slopes};
+use super::settings::Settings;
 use crate::recipe::{MethodName, Recipe};
 use crate::shape::{Bounds, NeighbourSearch, Pair, SignedDistance};
 
@@ -40,18 +43,25 @@ pub struct Rates {
 }
 
 /// Something that can be trained on a pair of shapes.
-pub trait Method<B: TrainBackend> {
+pub trait Method<B: TrainBackend>: Sync {
+    /// Into how many equal parts the samples of a step are divided; they are worked on side by side.
+    fn parts(&self) -> usize {
+        1
+    }
+
     /// The phase of a step, counted from 0.
     fn phase(&self, step: usize) -> Phase;
 
     /// The learning rates of a step.
     fn rates(&self, step: usize) -> Rates;
 
-    /// What step `step` minimises, on its own samples of the data.
-    fn objective(&self, data: &TrainingData, step: usize) -> Objective<B>;
+    /// What step `step` minimises, on one part of its own samples of the data, with replicas of the
+    /// networks. What the step minimises is the mean over the parts.
+    fn objective(&self, data: &TrainingData, step: usize, part: Part) -> Posed<B>;
 
-    /// Moves the networks that train in this step against their gradients.
-    fn descend(&mut self, step: usize, gradients: &mut B::Gradients);
+    /// Moves the networks that train in this step against their gradients, which come in the order in
+    /// which [`Self::objective`] names the networks.
+    fn descend(&mut self, step: usize, slopes: &mut Slopes);
 
     /// The networks and how many weights each has.
     fn networks(&self) -> Vec<(&'static str, usize)>;
@@ -73,6 +83,18 @@ pub trait Method<B: TrainBackend> {
 
     /// The motion as it stands, if the method has one.
     fn motion(&self) -> Option<Box<dyn Motion<B::InnerBackend>>>;
+}
+
+/// Into how many parts the samples of a step are divided, for networks of this size: a function of the
+/// recipe and the kind of backend, so that the sums come out the same on any number of cores.
+fn parts<B: TrainBackend>(settings: &Settings) -> usize {
+    let width = settings.implicit.width.max(settings.velocity.width);
+    let bytes = settings.training.batch * width * size_of::<f32>();
+    match B::LAYER_BYTES {
+        // A multiple of four, so that two or four cores have the same amount of work.
+        Some(limit) if bytes > limit => bytes.div_ceil(limit).next_multiple_of(4),
+        _ => 1,
+    }
 }
 
 /// The method that a recipe names, before its first step; `bounds` encloses both shapes, normalised.
@@ -123,8 +145,8 @@ pub fn check(recipe: &Recipe, pair: &Pair) -> Result<(), String> {
 pub struct TrainingData {
     /// The two shapes.
     pub pair: Pair,
-    distances: OnceCell<[SignedDistance; 2]>,
-    source_search: OnceCell<NeighbourSearch>,
+    distances: OnceLock<[SignedDistance; 2]>,
+    source_search: OnceLock<NeighbourSearch>,
 }
 
 impl TrainingData {
@@ -132,8 +154,8 @@ impl TrainingData {
     pub fn new(pair: Pair) -> Self {
         Self {
             pair,
-            distances: OnceCell::new(),
-            source_search: OnceCell::new(),
+            distances: OnceLock::new(),
+            source_search: OnceLock::new(),
         }
     }
 
@@ -186,10 +208,16 @@ impl<B: TrainBackend, M: AutodiffModule<B>> Trainee<B, M> {
         }
     }
 
-    /// One step of the optimiser; see [`optimiser::advance`].
-    pub fn advance(&mut self, gradients: &mut B::Gradients, rate: f64, clip: f64) {
+    /// The network with a place of its own in the graph: graphs that share no node can be made and
+    /// walked side by side.
+    pub fn replica(&self) -> M {
+        M::from_inner(self.net.valid())
+    }
+
+    /// One step of the optimiser against the sum of the parts' gradients; see [`optimiser::advance`].
+    pub fn advance(&mut self, parts: Vec<GradientsParams>, rate: f64, clip: f64) {
         let net = self.net.clone();
-        self.net = optimiser::advance(&mut self.optimiser, net, gradients, rate, clip);
+        self.net = optimiser::advance(&mut self.optimiser, net, parts, rate, clip);
     }
 
     /// The network for values.

@@ -8,12 +8,13 @@ use isomorph_model::baseline::linear::straight_lines;
 use isomorph_model::baseline::nfgp::{
     FixedPoint, Nfgp, NfgpConfig, NfgpMotion, NfgpMotionConfig, NfgpSamples, NfgpWeights,
 };
-use isomorph_model::{Geometry, Motion, Objective, TrainBackend};
+use isomorph_model::{Geometry, Motion, TrainBackend};
 
 use super::{Method, Rates, Records, Trainee, TrainingData};
-use crate::learner::batch;
+use crate::learner::batch::{self, Part};
 use crate::learner::checkpoint::{Checkpoint, CheckpointError};
 use crate::learner::event::Phase;
+use crate::learner::posed::{Posed, Slopes};
 use crate::learner::schedule::Schedule;
 use crate::recipe::{Recipe, TrainingRecipe};
 use crate::tensors::rows;
@@ -83,7 +84,7 @@ impl<B: TrainBackend> Method<B> for Deformations<B> {
         }
     }
 
-    fn objective(&self, data: &TrainingData, step: usize) -> Objective<B> {
+    fn objective(&self, data: &TrainingData, step: usize, _: Part) -> Posed<B> {
         let (index, ..) = self.turn(step);
         let time = self.done.net.time(index);
         let (handles, ends) = batch::draw_matched(&data.pair, &self.training, step);
@@ -102,12 +103,13 @@ impl<B: TrainBackend> Method<B> for Deformations<B> {
             neighbours: tensor(&drawn.neighbours),
             neighbour_normals: tensor(&drawn.neighbour_normals),
         };
-        self.work.net.objective(&samples, &self.weights)
+        let net = self.work.replica();
+        Posed::new(net.objective(&samples, &self.weights)).by(net)
     }
 
-    fn descend(&mut self, step: usize, gradients: &mut B::Gradients) {
+    fn descend(&mut self, step: usize, slopes: &mut Slopes) {
         let rate = self.rates(step).velocity;
-        self.work.advance(gradients, rate, self.training.clip);
+        self.work.advance(slopes.take(0), rate, self.training.clip);
         let (index, _, until) = self.turn(step);
         self.done.net.replace(index, &self.work.net);
         if step + 1 == until && index + 1 < self.done.net.times() {

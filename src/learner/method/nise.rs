@@ -11,12 +11,14 @@ use burn::module::Module;
 use isomorph_model::activation::Activation;
 use isomorph_model::baseline::blend::{SdfBlend, SdfBlendConfig};
 use isomorph_model::baseline::nise::{BetweenSamples, Evolution, Nise, NiseConfig, NiseWeights};
-use isomorph_model::{Geometry, ImplicitNetConfig, Motion, Objective, TrainBackend};
+use isomorph_model::{Geometry, ImplicitNetConfig, Motion, TrainBackend};
 
 use super::ends::{Drawn, end_weights};
-use super::{Method, Rates, Records, Trainee, TrainingData};
+use super::{Method, Rates, Records, Trainee, TrainingData, parts};
+use crate::learner::batch::Part;
 use crate::learner::checkpoint::{Checkpoint, CheckpointError};
 use crate::learner::event::Phase;
+use crate::learner::posed::{Posed, Slopes};
 use crate::learner::schedule::Schedule;
 use crate::learner::settings::Settings;
 use crate::recipe::{MethodName, MethodRecipe, Recipe};
@@ -105,14 +107,19 @@ impl<B: TrainBackend> Method<B> for Evolved<B> {
         }
     }
 
-    fn objective(&self, data: &TrainingData, step: usize) -> Objective<B> {
-        let drawn = Drawn::new(data, &self.settings, step, false, &self.device);
+    fn parts(&self) -> usize {
+        parts::<B>(&self.settings)
+    }
+
+    fn objective(&self, data: &TrainingData, step: usize, part: Part) -> Posed<B> {
+        let drawn = Drawn::new(data, &self.settings, step, part, false, &self.device);
         let derivatives = &self.settings.derivatives;
         if self.phase(step) == Phase::Ends {
             let [source, target] = drawn.apart();
             let weights = end_weights(&self.settings.loss);
-            let ends = &self.ends.net;
-            return ends.objective([&source, &target], &weights, derivatives);
+            let ends = self.ends.replica();
+            let objective = ends.objective([&source, &target], &weights, derivatives);
+            return Posed::new(objective).by(ends);
         }
         let weights = NiseWeights {
             data: self.method.ends,
@@ -123,18 +130,20 @@ impl<B: TrainBackend> Method<B> for Evolved<B> {
             points: rows(&drawn.batch.space.points, &self.device),
             times: column(&drawn.batch.between, &self.device),
         };
-        let net = &self.net.net;
-        net.objective(&drawn.both(), &between, &weights, derivatives)
+        let net = self.net.replica();
+        let objective = net.objective(&drawn.both(), &between, &weights, derivatives);
+        Posed::new(objective).by(net)
     }
 
-    fn descend(&mut self, step: usize, gradients: &mut B::Gradients) {
+    /// One network trains at a time, so the gradients are of that one.
+    fn descend(&mut self, step: usize, slopes: &mut Slopes) {
         let rate = self.rates(step).implicit;
         let clip = self.settings.training.clip;
         if self.phase(step) == Phase::Between {
-            self.net.advance(gradients, rate, clip);
+            self.net.advance(slopes.take(0), rate, clip);
             return;
         }
-        self.ends.advance(gradients, rate, clip);
+        self.ends.advance(slopes.take(0), rate, clip);
         if step + 1 == self.between_from {
             let ends = self.ends.net.clone();
             let net = field(&self.method, &self.settings, ends, &self.device);

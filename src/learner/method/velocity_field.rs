@@ -4,12 +4,13 @@
 use std::io;
 
 use burn::module::Module;
-use isomorph_model::{Geometry, ImplicitNet, Motion, Objective, TrainBackend, VelocityNet};
+use isomorph_model::{Geometry, ImplicitNet, Motion, TrainBackend, VelocityNet};
 
-use super::{Method, Rates, Records, Trainee, TrainingData};
-use crate::learner::batch::{self, BatchSizes};
+use super::{Method, Rates, Records, Trainee, TrainingData, parts};
+use crate::learner::batch::{self, BatchSizes, Part};
 use crate::learner::checkpoint::{Checkpoint, CheckpointError};
 use crate::learner::event::Phase;
+use crate::learner::posed::{Posed, Slopes};
 use crate::learner::schedule::Schedule;
 use crate::learner::settings::Settings;
 use crate::learner::step::Step;
@@ -53,30 +54,35 @@ impl<B: TrainBackend> Method<B> for VelocityField<B> {
         }
     }
 
-    fn objective(&self, data: &TrainingData, step: usize) -> Objective<B> {
-        let training = &self.settings.training;
-        let sizes = BatchSizes::new(training, data.pair.correspondences.len());
-        let batch = batch::draw(&data.pair, training, sizes, step);
-        let step = Step {
-            settings: &self.settings,
-            sizes,
-            phase: self.schedule.phase(step),
-            ramp: self.schedule.ramp(step),
-            f: &self.implicit.net,
-            v: &self.velocity.net,
-            device: &self.device,
-        };
-        step.objective(&batch)
+    fn parts(&self) -> usize {
+        parts::<B>(&self.settings)
     }
 
-    fn descend(&mut self, step: usize, gradients: &mut B::Gradients) {
+    fn objective(&self, data: &TrainingData, step: usize, part: Part) -> Posed<B> {
+        let training = &self.settings.training;
+        let sizes = BatchSizes::new(training, data.pair.correspondences.len(), part.of);
+        let batch = batch::draw(&data.pair, training, sizes, step).part(part);
+        let (f, v) = (self.implicit.replica(), self.velocity.replica());
+        let step = Step {
+            settings: &self.settings,
+            sizes: sizes.part(part.of),
+            phase: self.schedule.phase(step),
+            ramp: self.schedule.ramp(step),
+            f: &f,
+            v: &v,
+            device: &self.device,
+        };
+        Posed::new(step.objective(&batch)).by(f).by(v)
+    }
+
+    fn descend(&mut self, step: usize, slopes: &mut Slopes) {
         let clip = self.settings.training.clip;
         let (phase, rates) = (self.phase(step), self.rates(step));
         if phase != Phase::WarmUp {
-            self.implicit.advance(gradients, rates.implicit, clip);
+            self.implicit.advance(slopes.take(0), rates.implicit, clip);
         }
         if phase != Phase::ImplicitOnly {
-            self.velocity.advance(gradients, rates.velocity, clip);
+            self.velocity.advance(slopes.take(1), rates.velocity, clip);
         }
     }
 

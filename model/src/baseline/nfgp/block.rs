@@ -33,6 +33,7 @@ use super::{FixedPoint, NfgpConfig};
 use crate::backend::ModelBackend;
 use crate::encoding::{encode, encoded_width, encoding_derivatives};
 use crate::mlp::Dense;
+use crate::product::product;
 
 /// The initial norm of the output layer: a block starts near the identity.
 const INITIAL_OUTPUT: f64 = 0.01;
@@ -194,7 +195,7 @@ impl<B: ModelBackend> Residual<B> {
         let mut h = encode(x, self.frequencies);
         let last = self.layers.len() - 1;
         for (k, (weight, bias)) in self.layers.iter().enumerate() {
-            h = h.matmul(weight.clone()) + bias.clone();
+            h = product(h, weight.clone()) + bias.clone();
             if k < last {
                 h = elu_and_slope(h).0;
             }
@@ -213,8 +214,8 @@ impl<B: ModelBackend> Residual<B> {
         let mut lanes = lanewise(Tensor::cat(blocks, 1), slope);
         let last = self.layers.len() - 1;
         for (k, (weight, bias)) in self.layers.iter().enumerate() {
-            h = h.matmul(weight.clone()) + bias.clone();
-            lanes = lanes.matmul(weight.clone());
+            h = product(h, weight.clone()) + bias.clone();
+            lanes = product(lanes, weight.clone());
             if k < last {
                 let (value, slope) = elu_and_slope(h);
                 h = value;

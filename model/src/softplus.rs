@@ -1,0 +1,450 @@
+//! The softplus activation with all that passes through a layer beside the value, as one operation that is
+//! differentiable at every level of autodiff.
+//!
+//! Blocks of `n` rows are stacked along the batch axis: the value, then tangents, then a Laplacian. With
+//! `s'`, `s''`, `s'''` the derivatives at `z_0 + b`, the bias acting on the value alone, they become
+//!
+//! ```text
+//! h_0 = s(z_0 + b)                                       the value
+//! h_k = s' z_k                                           a tangent
+//! h_l = s' z_l + s'' (z_1^2 + z_2^2 + z_3^2)             the Laplacian
+//! ```
+//!
+//! and the gradients `g` by these give those by the `z`:
+//!
+//! ```text
+//! d_0 = s' g_0 + s'' (sum_k z_k g_k + z_l g_l) + s''' g_l (z_1^2 + z_2^2 + z_3^2)
+//! d_k = s' g_k + 2 s'' z_k g_l                           (the second only for k = 1, 2, 3)
+//! d_l = s' g_l
+//! ```
+//!
+//! For the softplus `s'' = beta s' (1 - s')` and `s''' = beta s'' (1 - 2 s')`, so one exponential and one
+//! logarithm per element serve all of it. burn's own `softplus` takes `exp(beta z)`, which overflows.
+
+use burn::tensor::ops::FloatTensor;
+use burn::tensor::{Tensor, TensorPrimitive};
+use burn_autodiff::Autodiff;
+use burn_autodiff::checkpoint::base::Checkpointer;
+use burn_autodiff::checkpoint::strategy::CheckpointStrategy;
+use burn_autodiff::grads::Gradients;
+use burn_autodiff::ops::{Backward, Ops, OpsKind};
+
+use crate::backend::ModelBackend;
+
+/// Directions of space, whose tangents the Laplacian is made from.
+pub(crate) const SPATIAL: usize = 3;
+
+/// What passes through the layers beside the value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Lanes {
+    /// Tangents: none, the three of space, or these and that of time.
+    pub tangents: usize,
+    /// Whether the Laplacian follows them.
+    pub laplacian: bool,
+}
+
+impl Lanes {
+    /// The value alone.
+    pub const VALUE: Self = Self {
+        tangents: 0,
+        laplacian: false,
+    };
+
+    /// Blocks of rows, the value's included.
+    pub const fn blocks(self) -> usize {
+        1 + self.tangents + self.laplacian as usize
+    }
+}
+
+/// A tensor of a primitive.
+pub(crate) fn tensor<B: ModelBackend>(primitive: FloatTensor<B>) -> Tensor<B, 2> {
+    Tensor::from_primitive(TensorPrimitive::Float(primitive))
+}
+
+/// The primitive of a tensor.
+pub(crate) fn primitive<B: ModelBackend>(tensor: Tensor<B, 2>) -> FloatTensor<B> {
+    tensor.into_primitive().tensor()
+}
+
+/// Value and slope from ordinary tensor operations, with `e = exp(-|beta z|)` in `(0, 1]`.
+pub(crate) fn value_and_slope<B: ModelBackend>(
+    z: Tensor<B, 2>,
+    beta: f64,
+) -> (Tensor<B, 2>, Tensor<B, 2>) {
+    let e = (z.clone().abs() * -beta).exp();
+    let value = z.clone().clamp_min(0.0) + e.clone().log1p() / beta;
+    // slope = 1 / (1 + e) right of zero and e / (1 + e) left of it. Divided, not multiplied by `recip`:
+    // burn-ndarray's vectorised reciprocal is an approximation, good to 4e-5 only.
+    let numerator = e.clone().mask_fill(z.greater_equal_elem(0.0), 1.0);
+    let slope = numerator / (e + 1.0);
+    (value, slope)
+}
+
+/// `s''` from `s'`.
+pub(crate) fn curvature<B: ModelBackend>(slope: &Tensor<B, 2>, beta: f64) -> Tensor<B, 2> {
+    (slope.clone() - slope.clone() * slope.clone()) * beta
+}
+
+/// Rows of block `k`.
+pub(crate) fn block<B: ModelBackend>(stacked: &Tensor<B, 2>, k: usize, n: usize) -> Tensor<B, 2> {
+    let columns = stacked.dims()[1];
+    stacked.clone().slice([k * n..(k + 1) * n, 0..columns])
+}
+
+/// `z_1^2 + z_2^2 + z_3^2`.
+fn squares<B: ModelBackend>(z: &Tensor<B, 2>, n: usize) -> Tensor<B, 2> {
+    let square = |k| block(z, k, n) * block(z, k, n);
+    square(1) + square(2) + square(3)
+}
+
+/// All blocks behind an activation whose value, slope and curvature are known, from ordinary tensor
+/// operations.
+pub(crate) fn pass<B: ModelBackend>(
+    value: Tensor<B, 2>,
+    slope: &Tensor<B, 2>,
+    curvature: &Tensor<B, 2>,
+    z: &Tensor<B, 2>,
+    lanes: Lanes,
+) -> Tensor<B, 2> {
+    if lanes == Lanes::VALUE {
+        return value;
+    }
+    let n = value.dims()[0];
+    let mut blocks = vec![value];
+    for k in 1..lanes.blocks() {
+        let passed = block(z, k, n) * slope.clone();
+        blocks.push(if k > lanes.tangents {
+            passed + squares(z, n) * curvature.clone()
+        } else {
+            passed
+        });
+    }
+    Tensor::cat(blocks, 0)
+}
+
+/// What leaves the activation, and the slope, from ordinary tensor operations; the shapes are those of
+/// [`ModelBackend::softplus_jet`].
+pub(crate) fn composed_jet<B: ModelBackend>(
+    z: Tensor<B, 2>,
+    bias: Tensor<B, 2>,
+    lanes: Lanes,
+    beta: f64,
+) -> (Tensor<B, 2>, Tensor<B, 2>) {
+    let n = z.dims()[0] / lanes.blocks();
+    let (value, slope) = value_and_slope(block(&z, 0, n) + bias, beta);
+    let out = pass(value, &slope, &curvature(&slope, beta), &z, lanes);
+    (out, slope)
+}
+
+/// The gradient by what entered, from ordinary tensor operations; the shapes are those of
+/// [`ModelBackend::softplus_jet_backward`].
+pub(crate) fn composed_jet_backward<B: ModelBackend>(
+    z: Option<Tensor<B, 2>>,
+    slope: Tensor<B, 2>,
+    grad: Tensor<B, 2>,
+    lanes: Lanes,
+    beta: f64,
+) -> Tensor<B, 2> {
+    let Some(z) = z else { return grad * slope };
+    let n = slope.dims()[0];
+    let curvature = curvature(&slope, beta);
+    let mut blocks: Vec<_> = (0..lanes.blocks())
+        .map(|k| block(&grad, k, n) * slope.clone())
+        .collect();
+    for k in 1..lanes.blocks() {
+        let through = block(&z, k, n) * block(&grad, k, n) * curvature.clone();
+        blocks[0] = blocks[0].clone() + through;
+    }
+    if lanes.laplacian {
+        let by_laplacian = block(&grad, lanes.tangents + 1, n);
+        let third = curvature.clone() * (slope * -2.0 + 1.0) * beta;
+        blocks[0] = blocks[0].clone() + squares(&z, n) * by_laplacian.clone() * third;
+        for (k, tangent) in blocks.iter_mut().enumerate().skip(1).take(SPATIAL) {
+            let bent = block(&z, k, n) * by_laplacian.clone() * curvature.clone();
+            *tangent = tangent.clone() + bent * 2.0;
+        }
+    }
+    Tensor::cat(blocks, 0)
+}
+
+/// The gradient by what entered, from that by the slope, from ordinary tensor operations.
+pub(crate) fn composed_slope_backward<B: ModelBackend>(
+    slope: Tensor<B, 2>,
+    grad: Tensor<B, 2>,
+    beta: f64,
+) -> Tensor<B, 2> {
+    curvature(&slope, beta) * grad
+}
+
+/// The backward pass of what leaves the activation.
+#[derive(Debug)]
+struct JetBackward;
+
+/// What it needs: tensors of the level below, tracked there; `z` only where there are tangents.
+#[derive(Clone, Debug)]
+struct JetState<B: ModelBackend> {
+    z: Option<FloatTensor<B>>,
+    slope: FloatTensor<B>,
+    lanes: Lanes,
+    beta: f64,
+}
+
+impl<B: ModelBackend> Backward<B, 2> for JetBackward {
+    type State = JetState<B>;
+
+    fn backward(self, ops: Ops<Self::State, 2>, grads: &mut Gradients, _: &mut Checkpointer) {
+        let grad = grads.consume::<B>(&ops.node);
+        let JetState {
+            z,
+            slope,
+            lanes,
+            beta,
+        } = ops.state;
+        let n = tensor::<B>(slope.clone()).dims()[0];
+        let by_z = B::softplus_jet_backward(z, slope, grad, lanes, beta);
+        let [z, bias] = ops.parents;
+        if let Some(bias) = bias {
+            let by_bias = block(&tensor::<B>(by_z.clone()), 0, n).sum_dim(0);
+            grads.register::<B>(bias.id, primitive(by_bias));
+        }
+        if let Some(z) = z {
+            grads.register::<B>(z.id, by_z);
+        }
+    }
+}
+
+/// The backward pass of the slope.
+#[derive(Debug)]
+struct SlopeBackward;
+
+impl<B: ModelBackend> Backward<B, 2> for SlopeBackward {
+    /// The slope, the sharpness, and how many blocks entered.
+    type State = (FloatTensor<B>, f64, usize);
+
+    fn backward(self, ops: Ops<Self::State, 2>, grads: &mut Gradients, _: &mut Checkpointer) {
+        let grad = grads.consume::<B>(&ops.node);
+        let (slope, beta, blocks) = ops.state;
+        let by_value = tensor::<B>(B::softplus_slope_backward(slope, grad, beta));
+        let [z, bias] = ops.parents;
+        if let Some(bias) = bias {
+            grads.register::<B>(bias.id, primitive(by_value.clone().sum_dim(0)));
+        }
+        if let Some(z) = z {
+            let mut rows = vec![by_value];
+            // The slope does not depend on the other blocks.
+            for _ in 1..blocks {
+                rows.push(rows[0].zeros_like());
+            }
+            grads.register::<B>(z.id, primitive(Tensor::cat(rows, 0)));
+        }
+    }
+}
+
+/// What leaves an activation, and its slope.
+type Pair<B> = (FloatTensor<B>, FloatTensor<B>);
+
+/// [`ModelBackend::softplus_jet`] one level up: the pair of the level below, tracked.
+pub(crate) fn tracked_jet<B: ModelBackend, C: CheckpointStrategy>(
+    z: FloatTensor<Autodiff<B, C>>,
+    bias: FloatTensor<Autodiff<B, C>>,
+    lanes: Lanes,
+    beta: f64,
+) -> Pair<Autodiff<B, C>> {
+    let entered = (lanes != Lanes::VALUE).then(|| z.primitive.clone());
+    let (out, slope) = B::softplus_jet(z.primitive, bias.primitive, lanes, beta);
+    let nodes = [z.node, bias.node];
+    let prepared = Backward::<B, 2>::prepare::<C>(JetBackward, nodes.clone());
+    let tracked_out = match prepared.compute_bound().stateful() {
+        OpsKind::Tracked(step) => {
+            let state = JetState {
+                z: entered,
+                slope: slope.clone(),
+                lanes,
+                beta,
+            };
+            step.finish(state, out)
+        }
+        OpsKind::UnTracked(step) => step.finish(out),
+    };
+    let prepared = Backward::<B, 2>::prepare::<C>(SlopeBackward, nodes);
+    let tracked_slope = match prepared.compute_bound().stateful() {
+        OpsKind::Tracked(step) => step.finish((slope.clone(), beta, lanes.blocks()), slope),
+        OpsKind::UnTracked(step) => step.finish(slope),
+    };
+    (tracked_out, tracked_slope)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{Plain, Train, host};
+    use burn::tensor::{Distribution, TensorData};
+
+    const BETA: f64 = 3.0;
+    const ALL: [Lanes; 5] = [
+        Lanes::VALUE,
+        Lanes {
+            tangents: 3,
+            laplacian: false,
+        },
+        Lanes {
+            tangents: 4,
+            laplacian: false,
+        },
+        Lanes {
+            tangents: 3,
+            laplacian: true,
+        },
+        Lanes {
+            tangents: 4,
+            laplacian: true,
+        },
+    ];
+
+    /// Numbers between -1 and 1, the same in every run.
+    fn numbers(rows: usize, columns: usize, seed: f32) -> Tensor<Plain, 2> {
+        let values = (0..rows * columns).map(|k| (seed + 1.7 * k as f32).sin());
+        let data = TensorData::new(values.collect::<Vec<f32>>(), [rows, columns]);
+        Tensor::from_data(data, &Default::default())
+    }
+
+    fn jet<B: ModelBackend>(z: &Tensor<B, 2>, bias: &Tensor<B, 2>, lanes: Lanes) -> Tensors<B> {
+        let (z, bias) = (primitive(z.clone()), primitive(bias.clone()));
+        let (out, slope) = B::softplus_jet(z, bias, lanes, BETA);
+        (tensor(out), tensor(slope))
+    }
+
+    /// What leaves, and the slope.
+    type Tensors<B> = (Tensor<B, 2>, Tensor<B, 2>);
+
+    fn assert_close(a: Vec<f64>, b: Vec<f64>, tolerance: f64, what: &str) {
+        assert_eq!(a.len(), b.len(), "{what}");
+        for (a, b) in a.iter().zip(b) {
+            assert!((a - b).abs() <= tolerance, "{what}: {a} and {b}");
+        }
+    }
+
+    #[test]
+    fn the_kernels_are_the_composed_operations() {
+        // Small, and larger than a piece of the kernel.
+        for (n, c) in [(3, 5), (700, 70)] {
+            for lanes in ALL {
+                let z = numbers(lanes.blocks() * n, c, 0.3);
+                let bias = numbers(1, c, 0.8);
+                let (out, slope) = jet(&z, &bias, lanes);
+                let (wanted, wanted_slope) = composed_jet(z.clone(), bias, lanes, BETA);
+                let label = format!("{lanes:?}, {n} x {c}");
+                // Both in f32, results up to 5, terms up to 30.
+                assert_close(host(out), host(wanted), 1e-5, &label);
+                assert_close(host(slope.clone()), host(wanted_slope), 1e-6, &label);
+                let grad = numbers(lanes.blocks() * n, c, 2.1);
+                let entered = (lanes != Lanes::VALUE).then(|| z.clone());
+                let by_z = Plain::softplus_jet_backward(
+                    entered.clone().map(primitive),
+                    primitive(slope.clone()),
+                    primitive(grad.clone()),
+                    lanes,
+                    BETA,
+                );
+                let wanted = composed_jet_backward(entered, slope.clone(), grad, lanes, BETA);
+                assert_close(host(tensor::<Plain>(by_z)), host(wanted), 3e-5, &label);
+                let grad = numbers(n, c, 1.1);
+                let by_z = Plain::softplus_slope_backward(
+                    primitive(slope.clone()),
+                    primitive(grad.clone()),
+                    BETA,
+                );
+                let wanted = composed_slope_backward(slope, grad, BETA);
+                assert_close(host(tensor::<Plain>(by_z)), host(wanted), 1e-5, &label);
+            }
+        }
+    }
+
+    /// A scalar that depends on everything that leaves, unevenly.
+    fn mixed<B: ModelBackend>(
+        z: &Tensor<B, 2>,
+        bias: &Tensor<B, 2>,
+        lanes: Lanes,
+        weights: &Tensor<B, 2>,
+        of_slope: &Tensor<B, 2>,
+    ) -> Tensor<B, 1> {
+        let (out, slope) = jet(z, bias, lanes);
+        (out * weights.clone()).sum() + (slope * of_slope.clone()).sum()
+    }
+
+    #[test]
+    fn the_first_and_second_derivatives_are_those_of_the_composed_operations() {
+        let (n, c) = (2, 3);
+        for lanes in ALL {
+            let rows = lanes.blocks() * n;
+            let up = |x: Tensor<Plain, 2>| Tensor::<Train, 2>::from_inner(x).require_grad();
+            let gradients = |composed: bool| {
+                let (z, bias) = (up(numbers(rows, c, 0.3)), up(numbers(1, c, 0.8)));
+                let lift = |x: &Tensor<Train, 2>| {
+                    Tensor::<Autodiff<Train>, 2>::from_inner(x.clone()).require_grad()
+                };
+                let (z2, bias2) = (lift(&z), lift(&bias));
+                let constant = |x: Tensor<Plain, 2>| {
+                    Tensor::<Autodiff<Train>, 2>::from_inner(Tensor::from_inner(x))
+                };
+                let (weights, of_slope) = (numbers(rows, c, 2.2), numbers(n, c, 1.2));
+                let (weights, of_slope) = (constant(weights), constant(of_slope));
+                let value = if composed {
+                    let (out, slope) = composed_jet(z2.clone(), bias2.clone(), lanes, BETA);
+                    (out * weights).sum() + (slope * of_slope).sum()
+                } else {
+                    mixed(&z2, &bias2, lanes, &weights, &of_slope)
+                };
+                let mut first = value.backward();
+                let by_z = z2.grad_remove(&mut first).expect("depends on z");
+                let by_bias = bias2.grad_remove(&mut first).expect("depends on the bias");
+                let weights = Tensor::<Train, 2>::from_inner(numbers(rows, c, 0.9));
+                let total =
+                    (by_z.clone() * weights).sum() + (by_bias.clone() * by_bias.clone()).sum();
+                let mut second = total.backward();
+                [
+                    host(by_z.inner()),
+                    host(by_bias.inner()),
+                    host(z.grad_remove(&mut second).expect("twice on z")),
+                    host(bias.grad_remove(&mut second).expect("twice on the bias")),
+                ]
+            };
+            let names = ["by z", "by the bias", "twice by z", "twice by the bias"];
+            for ((a, b), name) in gradients(false).into_iter().zip(gradients(true)).zip(names) {
+                // Both in f32; the second derivatives are sums of terms up to beta^3.
+                assert_close(a, b, 2e-4, &format!("{lanes:?} {name}"));
+            }
+        }
+    }
+
+    #[test]
+    fn the_derivatives_that_leave_are_those_along_a_curve() {
+        // z(s) = z_0 + z_1 s + z_l s^2 / 2 has slope z_1 and curvature z_l at s = 0, so s(z(s)) has the
+        // slope h_1 and the curvature h_l, if the other tangents are 0.
+        let (z0, z1, zl) = (0.2f64, -0.7f64, 0.4f64);
+        let lanes = Lanes {
+            tangents: 3,
+            laplacian: true,
+        };
+        let rows = [z0, z1, 0.0, 0.0, zl].map(|z| [z as f32]);
+        let z = Tensor::<Plain, 2>::from_floats(rows, &Default::default());
+        let out = host(jet(&z, &z.zeros_like().slice([0..1, 0..1]), lanes).0);
+        let soft = |z: f64| (BETA * z).exp().ln_1p() / BETA;
+        let at = |s: f64| soft(z0 + z1 * s + zl * s * s / 2.0);
+        let h = 1e-4;
+        let (slope, bend) = (
+            (at(h) - at(-h)) / (2.0 * h),
+            (at(h) - 2.0 * at(0.0) + at(-h)) / (h * h),
+        );
+        // Central differences in float64: h^2 and 1e-16 / h^2 are 1e-8; f32 rounding is the larger.
+        assert_close(out, vec![at(0.0), slope, 0.0, 0.0, bend], 1e-6, "curve");
+    }
+
+    #[test]
+    fn nothing_in_gives_nothing_out() {
+        let none = Tensor::<Plain, 2>::random([0, 4], Distribution::Default, &Default::default());
+        let bias = Tensor::zeros([1, 4], &Default::default());
+        let (out, slope) = jet(&none, &bias, Lanes::VALUE);
+        assert_eq!((out.dims(), slope.dims()), ([0, 4], [0, 4]));
+    }
+}
