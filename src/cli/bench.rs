@@ -38,6 +38,10 @@ pub(super) struct BenchArgs {
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
     repeats: u32,
 
+    /// Change a value of the recipe that the step is made from, such as training.batch=8000
+    #[arg(long, value_name = "SECTION.KEY=VALUE")]
+    set: Vec<String>,
+
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -91,6 +95,8 @@ pub(super) struct Measured {
     backend: String,
     size: String,
     derivatives: &'static str,
+    threads: usize,
+    set: Vec<String>,
     phases: Phases,
     peak_bytes: Option<u64>,
     matmul_gflops: f64,
@@ -119,6 +125,9 @@ pub(super) fn run(args: BenchArgs) -> Result<Ending> {
     } else {
         print_table(&measured);
     }
+    for warning in unused() {
+        eprintln!("isomorph: bench: {warning}");
+    }
     Ok(Ending::Done)
 }
 
@@ -132,7 +141,7 @@ impl Task for BenchArgs {
             Way::Forward => "forward",
         };
         let cost = |phase, warm_up: &str| -> Result<PhaseCost> {
-            let recipe = recipe(self.size, derivatives, warm_up)?;
+            let recipe = recipe(self.size, derivatives, warm_up, &self.set)?;
             let repeats = self.repeats as usize;
             measure::<B>(recipe, phase, repeats, matmul_gflops, &device)
         };
@@ -144,6 +153,8 @@ impl Task for BenchArgs {
             backend: B::InnerBackend::name(&device),
             size: self.size.name(),
             derivatives,
+            threads: rayon::current_num_threads(),
+            set: self.set,
             phases,
             peak_bytes: memory::peak_memory_bytes(),
             matmul_gflops,
@@ -151,11 +162,11 @@ impl Task for BenchArgs {
     }
 }
 
-/// The paper preset at a size, all of its steps in one phase.
-fn recipe(size: Size, derivatives: &str, warm_up: &str) -> Result<Recipe> {
+/// The paper preset at a size, all of its steps in one phase, with the changes asked for.
+fn recipe(size: Size, derivatives: &str, warm_up: &str, changes: &[String]) -> Result<Recipe> {
     let (depth, width_f, width_v, points, time_steps) = size.shape();
     let text = "preset = \"paper\"\n[data]\nsource = \"spheres\"\ntarget = \"spheres\"\n";
-    let set = [
+    let mut set = vec![
         format!("implicit.depth={depth}"),
         format!("implicit.width={width_f}"),
         format!("velocity.depth={depth}"),
@@ -167,6 +178,7 @@ fn recipe(size: Size, derivatives: &str, warm_up: &str) -> Result<Recipe> {
         format!("training.ramp-until={warm_up}"),
         "training.velocity-until=1".to_owned(),
     ];
+    set.extend_from_slice(changes);
     Ok(Recipe::parse(text, std::path::Path::new("bench"), &set)?)
 }
 
@@ -214,6 +226,29 @@ fn product_rate<B: ModelBackend>(device: &B::Device) -> f64 {
     };
     multiply();
     2.0 * 4000.0 * 512.0 * 512.0 / 1e9 / median((0..7).map(|_| multiply()).collect())
+}
+
+/// What the machine has and this run did not use.
+fn unused() -> Vec<String> {
+    let mut warnings = Vec::new();
+    if cfg!(debug_assertions) {
+        warnings.push("a build without optimisation: build with --release".to_owned());
+    }
+    let (threads, cores) = (
+        rayon::current_num_threads(),
+        std::thread::available_parallelism().map_or(1, usize::from),
+    );
+    if threads < cores {
+        warnings.push(format!(
+            "{threads} of {cores} cores used: unset RAYON_NUM_THREADS, or raise it"
+        ));
+    }
+    #[cfg(target_arch = "x86_64")]
+    if !std::arch::is_x86_feature_detected!("avx2") || !std::arch::is_x86_feature_detected!("fma") {
+        warnings
+            .push("this processor has no AVX2 and FMA: kernels run on narrow vectors".to_owned());
+    }
+    warnings
 }
 
 fn median(mut values: Vec<f64>) -> f64 {
