@@ -9,6 +9,7 @@ use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread::ScopedJoinHandle;
 
+use isomorph_model::without_denormals;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 /// Threads that take jobs.
@@ -42,11 +43,13 @@ impl Workers {
 
     /// `job(0), …, job(count - 1)`, in that order; the jobs run side by side.
     ///
-    /// One job alone runs on the caller's thread, with all of rayon's threads at its command.
+    /// One job alone runs on the caller's thread, with all of rayon's threads at its command. Jobs run
+    /// [`without_denormals`].
     ///
     /// # Panics
     /// If a job does.
     pub fn map<T: Send>(&self, count: usize, job: impl Fn(usize) -> T + Sync) -> Vec<T> {
+        let job = |k| without_denormals(|| job(k));
         if count < 2 || self.pools.len() < 2 {
             return (0..count).map(job).collect();
         }

@@ -17,9 +17,10 @@ use crate::softplus::{
 /// The operations have bodies of ordinary tensor operations, differentiable at any level of autodiff; a
 /// backend in the host's memory overrides them with kernels.
 pub trait ModelBackend: Backend {
-    /// How large the values of one layer should be at most, in bytes, where the device is a processor: so
-    /// large that a handful of them stays in a core's cache. `None` where larger batches are only better.
-    const LAYER_BYTES: Option<usize> = None;
+    /// How many points a core should take at a time, where the device is a processor: enough to pay for a
+    /// layer's weights, few enough that the values of some layers stay in its cache. `None` where larger
+    /// batches are only better.
+    const POINTS_AT_A_TIME: Option<usize> = None;
 
     /// The matrix product `a b`, tracked; `[m, k]` and `[k, n]` to `[m, n]`.
     fn product(a: FloatTensor<Self>, b: FloatTensor<Self>) -> FloatTensor<Self> {
@@ -82,7 +83,7 @@ impl<B> TrainBackend for B where B: ModelBackend + AutodiffBackend<InnerBackend:
 
 /// The backward passes are the composed ones, tracked on this level.
 impl<B: ModelBackend, C: CheckpointStrategy> ModelBackend for Autodiff<B, C> {
-    const LAYER_BYTES: Option<usize> = B::LAYER_BYTES;
+    const POINTS_AT_A_TIME: Option<usize> = B::POINTS_AT_A_TIME;
 
     fn product(a: FloatTensor<Self>, b: FloatTensor<Self>) -> FloatTensor<Self> {
         tracked_product::<B, C>(a, b)

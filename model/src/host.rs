@@ -5,12 +5,13 @@ use burn::tensor::TensorData;
 use burn::tensor::ops::FloatTensor;
 
 use crate::backend::ModelBackend;
-use crate::gemm::{self, Matrix};
 use crate::kernel;
+use crate::machine::{self, Matrix};
 use crate::softplus::Lanes;
 
-/// An eighth of the 2 MB of cache that a core of today's servers has, a fifth of a laptop's.
-const LAYER_BYTES: usize = 1 << 18;
+/// Measured on networks from 128 to 512 wide (`model/benches/README.md`): twice as many are a little faster
+/// still on two cores, and leave nothing for the others of a machine with more.
+const POINTS_AT_A_TIME: usize = 512;
 
 /// Access to the elements.
 trait HostBackend: ModelBackend {
@@ -32,7 +33,7 @@ trait HostBackend: ModelBackend {
 
 fn product<B: HostBackend>(a: FloatTensor<B>, b: FloatTensor<B>) -> FloatTensor<B> {
     let shape = [B::shape(&a)[0], B::shape(&b)[1]];
-    let out = B::matrix(&a, |a| B::matrix(&b, |b| gemm::product(a, b)));
+    let out = B::matrix(&a, |a| B::matrix(&b, |b| machine::product(a, b)));
     B::from_rows(out, shape)
 }
 
@@ -90,7 +91,7 @@ fn slope_backward<B: HostBackend>(
 macro_rules! on_the_host {
     ($backend:ty) => {
         impl ModelBackend for $backend {
-            const LAYER_BYTES: Option<usize> = Some(LAYER_BYTES);
+            const POINTS_AT_A_TIME: Option<usize> = Some(POINTS_AT_A_TIME);
 
             fn product(a: FloatTensor<Self>, b: FloatTensor<Self>) -> FloatTensor<Self> {
                 product::<Self>(a, b)

@@ -198,7 +198,8 @@ vectorised! {
     }
 }
 
-/// `exp(x)` for `x <= 0`: `2^n 2^r` with a whole `n` and `|r| <= 1/2`; 0 below -87.
+/// `exp(x)` for `x <= 0`: `2^n 2^r` with a whole `n` and `|r| <= 1/2`; 0 below -42, where it is 6e-19 and
+/// its square, which [`twice_atanh`] takes, would soon be too small for a normal `f32`.
 #[inline(always)]
 fn exp_of_negative(x: f32) -> f32 {
     /// Adding and subtracting it rounds to a whole number, whose bits are then the lowest of the sum.
@@ -207,7 +208,7 @@ fn exp_of_negative(x: f32) -> f32 {
     /// ln 2 in two parts, the first with few digits, so that `n * HIGH` is exact.
     const HIGH: f32 = 0.693_359_4;
     const LOW: f32 = -2.121_944_4e-4;
-    let clamped = if x < -87.0 { -87.0 } else { x };
+    let clamped = if x < -42.0 { -42.0 } else { x };
     let shifted = clamped * LOG2_E + ROUND;
     let n = shifted - ROUND;
     let r = clamped - n * HIGH - n * LOW;
@@ -225,7 +226,7 @@ fn exp_of_negative(x: f32) -> f32 {
         p = p * r + coefficient;
     }
     let scale = f32::from_bits((shifted.to_bits() << 23).wrapping_add(0x3f80_0000));
-    if x < -87.0 { 0.0 } else { p * scale }
+    if x < -42.0 { 0.0 } else { p * scale }
 }
 
 /// `2 atanh(s)` for `0 <= s <= 1/3`: the odd series up to `s^13`, the next term below 1e-8 of the sum.

@@ -31,14 +31,13 @@ pub mod backend;
 pub mod baseline;
 pub mod encoding;
 #[cfg(any(feature = "ndarray", feature = "flex"))]
-mod gemm;
-#[cfg(any(feature = "ndarray", feature = "flex"))]
 mod host;
 mod implicit_net;
 mod initial;
 #[cfg(any(feature = "ndarray", feature = "flex"))]
 mod kernel;
 pub mod loss;
+mod machine;
 mod mlp;
 mod morph;
 mod objective;
@@ -50,6 +49,7 @@ mod velocity_net;
 
 pub use backend::{ModelBackend, TrainBackend};
 pub use implicit_net::{ImplicitNet, ImplicitNetConfig};
+pub use machine::without_denormals;
 pub use mlp::{Mlp, MlpConfig};
 pub use morph::{Geometry, Motion};
 pub use objective::{Objective, Term};

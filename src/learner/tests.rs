@@ -150,20 +150,12 @@ fn the_parts_of_a_step_add_up_to_the_whole() {
 
 #[test]
 fn large_batches_are_divided_on_a_processor_alone() {
-    let parts = |batch: usize, width: usize| {
-        let set = [
-            format!("training.batch={batch}"),
-            format!("implicit.width={width}"),
-        ];
-        learner(&[&set[0], &set[1]]).method.parts()
-    };
-    // 88 x 8 values of 4 bytes fit into a quarter of a megabyte, 2200 x 128 take more than four of these.
-    assert_eq!(parts(88, 8), 1);
-    assert_eq!(parts(2200, 128), 8);
-    assert_eq!(parts(4000, 512), 32);
+    let parts = |batch: usize| method::parts::<B>(batch);
+    assert_eq!([88, 511, 512, 1000, 2200].map(parts), [1, 1, 4, 4, 4]);
+    assert_eq!([4000, 4086, 16_000].map(parts), [8, 8, 32]);
     #[cfg(feature = "wgpu")]
     assert_eq!(
-        <burn_wgpu::Wgpu as isomorph_model::ModelBackend>::LAYER_BYTES,
+        <burn_wgpu::Wgpu as isomorph_model::ModelBackend>::POINTS_AT_A_TIME,
         None
     );
 }

@@ -395,7 +395,7 @@ fn in_chunks<B: ModelBackend, T: Send>(
     points: &[[f32; 3]],
     map: impl Fn(&[[f32; 3]]) -> T + Sync,
 ) -> Vec<T> {
-    if B::LAYER_BYTES.is_none() {
+    if B::POINTS_AT_A_TIME.is_none() {
         return points.chunks(DEVICE_CHUNK).map(map).collect();
     }
     let chunks: Vec<_> = points.chunks(HOST_CHUNK).collect();

@@ -82,7 +82,7 @@ impl<B: TrainBackend, M: EndNet<B>> Method<B> for EndFit<B, M> {
     }
 
     fn parts(&self) -> usize {
-        parts::<B>(&self.settings)
+        parts::<B>(self.settings.training.batch)
     }
 
     fn objective(&self, data: &TrainingData, step: usize, part: Part) -> Posed<B> {

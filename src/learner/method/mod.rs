@@ -29,7 +29,6 @@ use super::checkpoint::{self, Checkpoint, CheckpointError};
 use super::event::Phase;
 use super::optimiser::{self, AdamOf};
 use super::posed::{Posed, Slopes};
-use super::settings::Settings;
 use crate::recipe::{MethodName, Recipe};
 use crate::shape::{Bounds, NeighbourSearch, Pair, SignedDistance};
 
@@ -85,14 +84,15 @@ pub trait Method<B: TrainBackend>: Sync {
     fn motion(&self) -> Option<Box<dyn Motion<B::InnerBackend>>>;
 }
 
-/// Into how many parts the samples of a step are divided, for networks of this size: a function of the
-/// recipe and the kind of backend, so that the sums come out the same on any number of cores.
-fn parts<B: TrainBackend>(settings: &Settings) -> usize {
-    let width = settings.implicit.width.max(settings.velocity.width);
-    let bytes = settings.training.batch * width * size_of::<f32>();
-    match B::LAYER_BYTES {
-        // A multiple of four, so that two or four cores have the same amount of work.
-        Some(limit) if bytes > limit => bytes.div_ceil(limit).next_multiple_of(4),
+/// The least batch that is divided: a quarter of fewer points would not pay for its operations.
+const DIVIDED: usize = 512;
+
+/// Into how many parts the samples of a step are divided: a function of the batch and the kind of backend,
+/// so that the sums come out the same on any number of cores.
+pub(super) fn parts<B: TrainBackend>(batch: usize) -> usize {
+    match B::POINTS_AT_A_TIME {
+        // A multiple of four, so that two, four or eight cores have the same amount of work each.
+        Some(points) if batch >= DIVIDED => ((batch / points + 2) / 4 * 4).max(4),
         _ => 1,
     }
 }

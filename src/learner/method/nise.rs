@@ -108,7 +108,7 @@ impl<B: TrainBackend> Method<B> for Evolved<B> {
     }
 
     fn parts(&self) -> usize {
-        parts::<B>(&self.settings)
+        parts::<B>(self.settings.training.batch)
     }
 
     fn objective(&self, data: &TrainingData, step: usize, part: Part) -> Posed<B> {

@@ -55,7 +55,7 @@ impl<B: TrainBackend> Method<B> for VelocityField<B> {
     }
 
     fn parts(&self) -> usize {
-        parts::<B>(&self.settings)
+        parts::<B>(self.settings.training.batch)
     }
 
     fn objective(&self, data: &TrainingData, step: usize, part: Part) -> Posed<B> {
