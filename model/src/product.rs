@@ -70,21 +70,7 @@ pub(crate) fn tracked_product<B: ModelBackend, C: CheckpointStrategy>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{Plain, Train, host};
-    use burn::tensor::TensorData;
-
-    fn numbers<B: ModelBackend>(rows: usize, columns: usize, seed: f32) -> Tensor<B, 2> {
-        let values = (0..rows * columns).map(|k| (seed + 1.7 * k as f32).sin());
-        let data = TensorData::new(values.collect::<Vec<f32>>(), [rows, columns]);
-        Tensor::from_data(data, &Default::default())
-    }
-
-    fn assert_close(a: Vec<f64>, b: Vec<f64>, tolerance: f64, label: &str) {
-        assert_eq!(a.len(), b.len(), "{label}");
-        for (a, b) in a.iter().zip(b) {
-            assert!((a - b).abs() <= tolerance, "{label}: {a} and {b}");
-        }
-    }
+    use crate::testing::{Plain, Train, assert_close, host, numbers};
 
     #[test]
     fn it_is_burns_own_for_matrices_and_transposed_ones_and_slices() {

@@ -277,8 +277,8 @@ pub(crate) fn tracked_jet<B: ModelBackend, C: CheckpointStrategy>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{Plain, Train, host};
-    use burn::tensor::{Distribution, TensorData};
+    use crate::testing::{Plain, Train, assert_close, host, numbers};
+    use burn::tensor::Distribution;
 
     const BETA: f64 = 3.0;
     const ALL: [Lanes; 5] = [
@@ -301,13 +301,6 @@ mod tests {
         },
     ];
 
-    /// Numbers between -1 and 1, the same in every run.
-    fn numbers(rows: usize, columns: usize, seed: f32) -> Tensor<Plain, 2> {
-        let values = (0..rows * columns).map(|k| (seed + 1.7 * k as f32).sin());
-        let data = TensorData::new(values.collect::<Vec<f32>>(), [rows, columns]);
-        Tensor::from_data(data, &Default::default())
-    }
-
     fn jet<B: ModelBackend>(z: &Tensor<B, 2>, bias: &Tensor<B, 2>, lanes: Lanes) -> Tensors<B> {
         let (z, bias) = (primitive(z.clone()), primitive(bias.clone()));
         let (out, slope) = B::softplus_jet(z, bias, lanes, BETA);
@@ -317,19 +310,12 @@ mod tests {
     /// What leaves, and the slope.
     type Tensors<B> = (Tensor<B, 2>, Tensor<B, 2>);
 
-    fn assert_close(a: Vec<f64>, b: Vec<f64>, tolerance: f64, what: &str) {
-        assert_eq!(a.len(), b.len(), "{what}");
-        for (a, b) in a.iter().zip(b) {
-            assert!((a - b).abs() <= tolerance, "{what}: {a} and {b}");
-        }
-    }
-
     #[test]
     fn the_kernels_are_the_composed_operations() {
         // Small, and larger than a piece of the kernel.
         for (n, c) in [(3, 5), (700, 70)] {
             for lanes in ALL {
-                let z = numbers(lanes.blocks() * n, c, 0.3);
+                let z = numbers::<Plain>(lanes.blocks() * n, c, 0.3);
                 let bias = numbers(1, c, 0.8);
                 let (out, slope) = jet(&z, &bias, lanes);
                 let (wanted, wanted_slope) = composed_jet(z.clone(), bias, lanes, BETA);

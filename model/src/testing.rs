@@ -57,3 +57,19 @@ pub fn shaken<B: Backend, M: Module<B>>(net: M, by: f64) -> M {
     }
     net.map(&mut Shake { by, count: 0.0 })
 }
+
+/// Numbers between -1 and 1, the same for the same seed, `[rows, columns]`.
+pub fn numbers<B: Backend>(rows: usize, columns: usize, seed: f32) -> Tensor<B, 2> {
+    let values = (0..rows * columns).map(|k| (seed + 1.7 * k as f32).sin());
+    let data = TensorData::new(values.collect::<Vec<f32>>(), [rows, columns]);
+    Tensor::from_data(data, &Default::default())
+}
+
+/// Fails unless both have as many numbers, each within the tolerance of the other.
+#[track_caller]
+pub fn assert_close(a: Vec<f64>, b: Vec<f64>, tolerance: f64, label: &str) {
+    assert_eq!(a.len(), b.len(), "{label}");
+    for (a, b) in a.iter().zip(b) {
+        assert!((a - b).abs() <= tolerance, "{label}: {a} and {b}");
+    }
+}
