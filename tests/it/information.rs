@@ -195,3 +195,33 @@ fn bench_reports_the_cost_of_a_step_as_json() {
     }
     assert_eq!(place.names(), [""; 0], "a bench leaves nothing");
 }
+
+#[test]
+fn bench_takes_changes_of_its_recipe_and_says_which() {
+    let _turn = turn();
+    let place = Workplace::new();
+    let gflop = |batch: &str| {
+        let set = format!("training.batch={batch}");
+        let bench = [
+            "bench",
+            "--size",
+            "small",
+            "--repeats",
+            "1",
+            "--json",
+            "--set",
+        ];
+        let ended = place.isomorph(&[&bench[..], &[&set]].concat()).succeeded();
+        let report: Value = serde_json::from_str(&ended.stdout).expect("one object of JSON");
+        assert_eq!(report["set"], Value::from(vec![set]));
+        assert!(report["threads"].as_u64().is_some_and(|count| count > 0));
+        report["phases"]["joint"]["gflop_per_step"]
+            .as_f64()
+            .expect("a number")
+    };
+    // The correspondences are as many in both, so it is less than twice.
+    let ratio = gflop("1000") / gflop("500");
+    assert!((1.2..2.0).contains(&ratio), "{ratio}");
+    let bad = place.isomorph(&["bench", "--set", "training.batch=7"]);
+    bad.refused(2, &["training.batch", "7"]);
+}
