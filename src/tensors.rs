@@ -1,4 +1,4 @@
-//! Points and times of the host as tensors.
+//! Points and times of the host as tensors, and tensors as numbers of the host.
 
 use burn::tensor::backend::Backend;
 use burn::tensor::{Tensor, TensorData};
@@ -12,4 +12,9 @@ pub fn rows<B: Backend>(points: &[[f32; 3]], device: &B::Device) -> Tensor<B, 2>
 /// Values as a tensor `[n, 1]`.
 pub fn column<B: Backend>(values: &[f32], device: &B::Device) -> Tensor<B, 2> {
     Tensor::from_data(TensorData::new(values.to_vec(), [values.len(), 1]), device)
+}
+
+/// The values of a tensor, row by row.
+pub fn host<B: Backend>(tensor: Tensor<B, 2>) -> Vec<f32> {
+    tensor.into_data().iter::<f32>().collect()
 }

@@ -15,18 +15,12 @@ use serde::{Deserialize, Serialize};
 
 use super::SurfaceMesh;
 use super::carry::{CarryError, rewrite_vertices};
+use super::chunks::in_chunks;
 use super::extract::{ExtractError, Grid, GridError, extract};
 use super::write::{SurfaceFormat, SurfaceView, WriteError, write_surface};
 use crate::atomic::write_atomically;
 use crate::shape::{self, Bounds, Normalisation, ShapeError};
-use crate::tensors::rows;
-use crate::workers::Workers;
-
-/// Points per evaluation of a network by one core: the values of a layer of 128 stay in its cache.
-const HOST_CHUNK: usize = 1024;
-
-/// Points per evaluation on a device where larger batches are only better.
-const DEVICE_CHUNK: usize = 1 << 16;
+use crate::tensors::{host, rows};
 
 /// What was trained and the frame that it lives in.
 pub struct Trained<B: Backend> {
@@ -388,21 +382,4 @@ fn carry<B: ModelBackend>(
         names[k] = Some(name);
     }
     Ok(names)
-}
-
-/// Evaluates `map` on points, a chunk at a time, on a processor on all of its cores.
-fn in_chunks<B: ModelBackend, T: Send>(
-    points: &[[f32; 3]],
-    map: impl Fn(&[[f32; 3]]) -> T + Sync,
-) -> Vec<T> {
-    if B::POINTS_AT_A_TIME.is_none() {
-        return points.chunks(DEVICE_CHUNK).map(map).collect();
-    }
-    let chunks: Vec<_> = points.chunks(HOST_CHUNK).collect();
-    Workers::shared().map(chunks.len(), |k| map(chunks[k]))
-}
-
-/// The values of a tensor, row by row.
-fn host<B: Backend>(tensor: Tensor<B, 2>) -> Vec<f32> {
-    tensor.into_data().iter::<f32>().collect()
 }

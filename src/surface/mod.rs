@@ -8,6 +8,7 @@
 //! | `cell.rs` | the closed loops in which a surface crosses one cell, and their triangles |
 //! | `polygonise.rs` | cells joined into one mesh with shared vertices |
 //! | `components.rs` | connected pieces and filters that drop the small ones |
+//! | `chunks.rs` | networks at many points, on all cores |
 //! | `carry.rs` | the input file again, its vertices moved |
 //! | `write.rs` | PLY and OBJ files |
 //!
@@ -16,6 +17,7 @@
 
 pub mod carry;
 mod cell;
+mod chunks;
 pub mod components;
 pub mod extract;
 pub mod frames;
