@@ -11,7 +11,7 @@ use burn::tensor::Tensor;
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use isomorph_model::activation::Activation;
-use isomorph_model::softplus::Lanes;
+use isomorph_model::jet::Lanes;
 use isomorph_model::{ModelBackend, TrainBackend, product};
 
 use backends::{numbers, on_each_backend};
@@ -20,8 +20,11 @@ fn main() {
     divan::main();
 }
 
-/// The softplus of the preset `paper`.
-const SOFTPLUS: Activation = Activation::Softplus { beta: 100.0 };
+/// The softplus of the preset `paper`, and the sine that fits the ends best.
+const ACTIVATIONS: [Activation; 2] = [
+    Activation::Softplus { beta: 100.0 },
+    Activation::Sine { omega: 20.0 },
+];
 
 /// A layer of so many inputs and outputs, that so many rows enter.
 #[derive(Clone, Copy, Debug)]
@@ -84,9 +87,10 @@ const LAYERS: [Layer; 7] = [
     Layer::new(4000, 256, 3),
 ];
 
-/// Lanes of so many rows each, 256 columns wide.
+/// Lanes of so many rows each, 256 columns wide, and what they pass through.
 #[derive(Clone, Copy, Debug)]
 struct Block {
+    activation: Activation,
     rows: usize,
     lanes: Lanes,
 }
@@ -108,7 +112,11 @@ impl Block {
 
 impl fmt::Display for Block {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(out, "{} rows, value", self.rows)?;
+        let name = match self.activation {
+            Activation::Softplus { .. } => "softplus",
+            Activation::Sine { .. } => "sine",
+        };
+        write!(out, "{name}, {} rows, value", self.rows)?;
         if self.lanes.tangents > 0 {
             write!(out, ", {} tangents", self.lanes.tangents)?;
         }
@@ -122,15 +130,20 @@ impl fmt::Display for Block {
 /// Every kind of lanes: in a core's cache, and far larger.
 fn blocks() -> impl Iterator<Item = Block> {
     let kinds = [(0, false), (3, false), (4, false), (3, true), (4, true)];
-    [64, 4000].into_iter().flat_map(move |rows| {
-        kinds.map(|(tangents, laplacian)| Block {
-            rows,
-            lanes: Lanes {
-                tangents,
-                laplacian,
-            },
+    let sizes = ACTIVATIONS.map(|activation| [64, 4000].map(|rows| (activation, rows)));
+    sizes
+        .into_iter()
+        .flatten()
+        .flat_map(move |(activation, rows)| {
+            kinds.map(|(tangents, laplacian)| Block {
+                activation,
+                rows,
+                lanes: Lanes {
+                    tangents,
+                    laplacian,
+                },
+            })
         })
-    })
 }
 
 /// Times an activation and its backward pass, from a gradient that is an ordinary tensor.
@@ -139,7 +152,7 @@ fn activation_and_backward<B: TrainBackend>(bencher: Bencher<'_, '_>, block: Blo
     let grad = z.clone();
     let (z, bias) = (z.require_grad(), bias.require_grad());
     bencher.counter(block.elements()).bench_local(|| {
-        let out = SOFTPLUS.jet(z.clone(), bias.clone(), block.lanes);
+        let out = block.activation.jet(z.clone(), bias.clone(), block.lanes);
         (out * grad.clone()).sum().backward()
     });
 }
@@ -178,7 +191,7 @@ on_each_backend! {
         let (z, bias) = block.tensors::<Plain>();
         bencher
             .counter(block.elements())
-            .bench_local(|| SOFTPLUS.jet(z.clone(), bias.clone(), block.lanes));
+            .bench_local(|| block.activation.jet(z.clone(), bias.clone(), block.lanes));
     }
 
     /// The activation with its backward pass, and a product and a sum to start that from.

@@ -1,17 +1,18 @@
 //! The activations of the networks, with the derivatives that the operators need.
 //!
-//! | | value `s(z)` | slope `s'(z)` | curvature `s''(z)` |
-//! |---|---|---|---|
-//! | softplus | `log(1 + exp(beta z)) / beta` | `1 / (1 + exp(-beta z))` | `beta s' (1 - s')` |
-//! | sine | `sin(omega z)` | `omega cos(omega z)` | `-omega^2 sin(omega z)` |
+//! | | value `s(z)` | slope `s'(z)` | curvature `s''` | third `s'''` |
+//! |---|---|---|---|---|
+//! | softplus | `log(1 + exp(beta z)) / beta` | `1 / (1 + exp(-beta z))` | `beta s' (1 - s')` | `beta s'' (1 - 2 s')` |
+//! | sine | `sin(omega z)` | `omega cos(omega z)` | `-omega^2 s` | `-omega^2 s'` |
 //!
 //! The paper uses softplus (Section 4) and leaves beta open; the sine is that of SIREN (Sitzmann et
-//! al. 2020).
+//! al. 2020). Here they are written in ordinary tensor operations, for any backend; [`crate::jet`] makes one
+//! operation of all that a layer needs of them. burn's own `softplus` takes `exp(beta z)`, which overflows.
 
 use burn::tensor::Tensor;
 
 use crate::backend::ModelBackend;
-use crate::softplus::{self, Lanes};
+use crate::jet::{Lanes, block, primitive, tensor};
 
 /// An activation, applied to each element.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,10 +32,7 @@ pub enum Activation {
 impl Activation {
     /// `s(z)`.
     pub fn value<B: ModelBackend>(self, z: Tensor<B, 2>) -> Tensor<B, 2> {
-        match self {
-            Self::Softplus { beta } => softplus::value_and_slope(z, beta).0,
-            Self::Sine { omega } => (z * omega).sin(),
-        }
+        self.composed(z).0
     }
 
     /// `s(z + bias)` and `s'(z + bias)`.
@@ -46,17 +44,11 @@ impl Activation {
         z: Tensor<B, 2>,
         bias: Tensor<B, 2>,
     ) -> (Tensor<B, 2>, Tensor<B, 2>) {
-        match self {
-            Self::Softplus { beta } => softplus_jet(z, bias, Lanes::VALUE, beta),
-            Self::Sine { omega } => {
-                let angle = (z + bias) * omega;
-                (angle.clone().sin(), angle.cos() * omega)
-            }
-        }
+        self.jet_and_slope(z, bias, Lanes::VALUE)
     }
 
     /// The value, tangents and Laplacian that leave the activation where `z` enters it, all stacked as in
-    /// [`softplus`].
+    /// [`crate::jet`].
     ///
     /// # Shapes
     /// `z` and the result: `[blocks n, c]`; `bias`: `[1, c]`.
@@ -66,27 +58,67 @@ impl Activation {
         bias: Tensor<B, 2>,
         lanes: Lanes,
     ) -> Tensor<B, 2> {
+        self.jet_and_slope(z, bias, lanes).0
+    }
+
+    fn jet_and_slope<B: ModelBackend>(
+        self,
+        z: Tensor<B, 2>,
+        bias: Tensor<B, 2>,
+        lanes: Lanes,
+    ) -> (Tensor<B, 2>, Tensor<B, 2>) {
+        let (out, slope) = B::activation_jet(primitive(z), primitive(bias), lanes, self);
+        (tensor(out), tensor(slope))
+    }
+
+    /// Value and slope from ordinary tensor operations.
+    pub(crate) fn composed<B: ModelBackend>(self, z: Tensor<B, 2>) -> (Tensor<B, 2>, Tensor<B, 2>) {
         match self {
-            Self::Softplus { beta } => softplus_jet(z, bias, lanes, beta).0,
+            Self::Softplus { beta } => softplus_and_slope(z, beta),
             Self::Sine { omega } => {
-                let n = z.dims()[0] / lanes.blocks();
-                let (value, slope) = self.value_and_slope(softplus::block(&z, 0, n), bias);
-                let curvature = value.clone() * (-omega * omega);
-                softplus::pass(value, &slope, &curvature, &z, lanes)
+                let angle = z * omega;
+                (angle.clone().sin(), angle.cos() * omega)
             }
+        }
+    }
+
+    /// `s''` from what left the activation, whose first rows are `s`, and from `s'`.
+    ///
+    /// # Shapes
+    /// `out`: `[blocks n, c]`; `slope` and the result: `[n, c]`.
+    pub(crate) fn curvature<B: ModelBackend>(
+        self,
+        out: &Tensor<B, 2>,
+        slope: &Tensor<B, 2>,
+    ) -> Tensor<B, 2> {
+        match self {
+            Self::Softplus { beta } => (slope.clone() - slope.clone() * slope.clone()) * beta,
+            Self::Sine { omega } => block(out, 0, slope.dims()[0]) * (-omega * omega),
+        }
+    }
+
+    /// `s'''` from `s'` and `s''`, all `[n, c]`.
+    pub(crate) fn third<B: ModelBackend>(
+        self,
+        slope: Tensor<B, 2>,
+        curvature: Tensor<B, 2>,
+    ) -> Tensor<B, 2> {
+        match self {
+            Self::Softplus { beta } => curvature * (slope * -2.0 + 1.0) * beta,
+            Self::Sine { omega } => slope * (-omega * omega),
         }
     }
 }
 
-fn softplus_jet<B: ModelBackend>(
-    z: Tensor<B, 2>,
-    bias: Tensor<B, 2>,
-    lanes: Lanes,
-    beta: f64,
-) -> (Tensor<B, 2>, Tensor<B, 2>) {
-    let (z, bias) = (softplus::primitive(z), softplus::primitive(bias));
-    let (out, slope) = B::softplus_jet(z, bias, lanes, beta);
-    (softplus::tensor(out), softplus::tensor(slope))
+/// The softplus and its slope with `e = exp(-|beta z|)` in `(0, 1]`.
+fn softplus_and_slope<B: ModelBackend>(z: Tensor<B, 2>, beta: f64) -> (Tensor<B, 2>, Tensor<B, 2>) {
+    let e = (z.clone().abs() * -beta).exp();
+    let value = z.clone().clamp_min(0.0) + e.clone().log1p() / beta;
+    // slope = 1 / (1 + e) right of zero and e / (1 + e) left of it. Divided, not multiplied by `recip`:
+    // burn-ndarray's vectorised reciprocal is an approximation, good to 4e-5 only.
+    let numerator = e.clone().mask_fill(z.greater_equal_elem(0.0), 1.0);
+    let slope = numerator / (e + 1.0);
+    (value, slope)
 }
 
 #[cfg(test)]
@@ -161,10 +193,7 @@ mod tests {
         ] {
             let z = column::<Train>(&[-0.3, -0.02, 0.0, 0.15, 0.4]).require_grad();
             let (value, slope) = activation.value_and_slope(z.clone(), none(1));
-            let curvature = match activation {
-                Activation::Softplus { beta } => softplus::curvature(&slope, beta),
-                Activation::Sine { omega } => value.clone() * (-omega * omega),
-            };
+            let curvature = activation.curvature(&value, &slope);
             let by_value = z.grad(&value.sum().backward()).expect("value depends on z");
             // Both sides round the same f32 expressions: a few units in the last place.
             for (a, b) in host(by_value).iter().zip(host(slope.clone())) {

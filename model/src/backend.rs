@@ -1,16 +1,16 @@
-//! What the mathematics asks of a backend beyond burn's own operations: matrix products, the softplus with
-//! all that passes through a layer beside the value ([`crate::softplus`]), and how large its working set
-//! should be.
+//! What the mathematics asks of a backend beyond burn's own operations: matrix products, activations with
+//! all that passes through a layer beside the value ([`crate::jet`]), and how large its working set should be.
 
 use burn::tensor::backend::{AutodiffBackend, Backend};
 use burn::tensor::ops::FloatTensor;
 use burn_autodiff::Autodiff;
 use burn_autodiff::checkpoint::strategy::CheckpointStrategy;
 
-use crate::product::tracked_product;
-use crate::softplus::{
+use crate::activation::Activation;
+use crate::jet::{
     self, Lanes, composed_jet, composed_jet_backward, composed_slope_backward, primitive, tensor,
 };
+use crate::product::tracked_product;
 
 /// A backend on which the networks can be evaluated.
 ///
@@ -27,51 +27,51 @@ pub trait ModelBackend: Backend {
         Self::float_matmul(a, b)
     }
 
-    /// What leaves a softplus of sharpness `beta`, and its slope; both tracked.
-    ///
-    /// Stable for every finite input: nothing larger than `exp(0)` is ever taken.
+    /// What leaves an activation, and its slope; both tracked.
     ///
     /// # Shapes
     /// `z`: `[blocks n, c]`; `bias`: `[1, c]`, added to the first block; results `[blocks n, c]`, `[n, c]`.
-    fn softplus_jet(
+    fn activation_jet(
         z: FloatTensor<Self>,
         bias: FloatTensor<Self>,
         lanes: Lanes,
-        beta: f64,
+        activation: Activation,
     ) -> (FloatTensor<Self>, FloatTensor<Self>) {
-        let (out, slope) = composed_jet::<Self>(tensor(z), tensor(bias), lanes, beta);
+        let (out, slope) = composed_jet::<Self>(tensor(z), tensor(bias), lanes, activation);
         (primitive(out), primitive(slope))
     }
 
-    /// The gradient by `z` of [`Self::softplus_jet`] from that by its first result, `[blocks n, c]`; `z` is
-    /// left out where the value travels alone.
-    fn softplus_jet_backward(
+    /// The gradient by `z` of [`Self::activation_jet`] from that by its first result, `[blocks n, c]`; `out`
+    /// and `slope` are its results, and `z` is left out where the value travels alone.
+    fn activation_jet_backward(
         z: Option<FloatTensor<Self>>,
+        out: FloatTensor<Self>,
         slope: FloatTensor<Self>,
         grad: FloatTensor<Self>,
         lanes: Lanes,
-        beta: f64,
+        activation: Activation,
     ) -> FloatTensor<Self> {
         let z = z.map(tensor::<Self>);
+        let (out, slope, grad) = (tensor(out), tensor(slope), tensor(grad));
         primitive(composed_jet_backward(
-            z,
-            tensor(slope),
-            tensor(grad),
-            lanes,
-            beta,
+            z, &out, slope, grad, lanes, activation,
         ))
     }
 
-    /// The gradient by the first block of `z` of [`Self::softplus_jet`] from that by the slope, `[n, c]`.
-    fn softplus_slope_backward(
+    /// The gradient by the first block of `z` of [`Self::activation_jet`] from that by the slope, `[n, c]`;
+    /// `out` and `slope` are its results.
+    fn activation_slope_backward(
+        out: FloatTensor<Self>,
         slope: FloatTensor<Self>,
         grad: FloatTensor<Self>,
-        beta: f64,
+        activation: Activation,
     ) -> FloatTensor<Self> {
-        primitive(composed_slope_backward::<Self>(
-            tensor(slope),
+        let (out, slope) = (tensor::<Self>(out), tensor(slope));
+        primitive(composed_slope_backward(
+            &out,
+            &slope,
             tensor(grad),
-            beta,
+            activation,
         ))
     }
 }
@@ -89,13 +89,13 @@ impl<B: ModelBackend, C: CheckpointStrategy> ModelBackend for Autodiff<B, C> {
         tracked_product::<B, C>(a, b)
     }
 
-    fn softplus_jet(
+    fn activation_jet(
         z: FloatTensor<Self>,
         bias: FloatTensor<Self>,
         lanes: Lanes,
-        beta: f64,
+        activation: Activation,
     ) -> (FloatTensor<Self>, FloatTensor<Self>) {
-        softplus::tracked_jet::<B, C>(z, bias, lanes, beta)
+        jet::tracked_jet::<B, C>(z, bias, lanes, activation)
     }
 }
 

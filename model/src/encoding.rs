@@ -13,7 +13,9 @@
 use std::f64::consts::PI;
 
 use burn::tensor::Tensor;
-use burn::tensor::backend::Backend;
+
+use crate::activation::Activation;
+use crate::backend::ModelBackend;
 
 /// Columns of the encoding of a point with `frequencies` octaves: `3 (2 m + 1)`.
 pub const fn encoded_width(frequencies: usize) -> usize {
@@ -29,16 +31,15 @@ pub fn encoding_scale(frequencies: usize) -> f64 {
 ///
 /// # Shapes
 /// `[n, 3]` to `[n, 3 (2 m + 1)]`; `frequencies = 0` returns the points unchanged.
-pub fn encode<B: Backend>(x: Tensor<B, 2>, frequencies: usize) -> Tensor<B, 2> {
+pub fn encode<B: ModelBackend>(x: Tensor<B, 2>, frequencies: usize) -> Tensor<B, 2> {
     if frequencies == 0 {
         return x;
     }
     let mut blocks = vec![x.clone()];
     for octave in 0..frequencies {
         let k = 2f64.powi(octave as i32) * PI;
-        let angle = x.clone() * k;
-        blocks.push(angle.clone().sin() / k);
-        blocks.push(angle.cos() / k);
+        let (sine, cosine) = sine_and_cosine(x.clone(), k);
+        blocks.extend([sine / k, cosine / k]);
     }
     Tensor::cat(blocks, 1) * encoding_scale(frequencies)
 }
@@ -47,7 +48,7 @@ pub fn encode<B: Backend>(x: Tensor<B, 2>, frequencies: usize) -> Tensor<B, 2> {
 ///
 /// # Shapes
 /// `[n, 3]` to two of `[n, 3 (2 m + 1)]`.
-pub fn encoding_derivatives<B: Backend>(
+pub fn encoding_derivatives<B: ModelBackend>(
     x: Tensor<B, 2>,
     frequencies: usize,
 ) -> (Tensor<B, 2>, Tensor<B, 2>) {
@@ -55,7 +56,7 @@ pub fn encoding_derivatives<B: Backend>(
     let mut second = vec![x.zeros_like()];
     for octave in 0..frequencies {
         let k = 2f64.powi(octave as i32) * PI;
-        let (sine, cosine) = ((x.clone() * k).sin(), (x.clone() * k).cos());
+        let (sine, cosine) = sine_and_cosine(x.clone(), k);
         first.extend([cosine.clone(), -sine.clone()]);
         second.extend([sine * -k, cosine * -k]);
     }
@@ -64,6 +65,13 @@ pub fn encoding_derivatives<B: Backend>(
         Tensor::cat(first, 1) * scale,
         Tensor::cat(second, 1) * scale,
     )
+}
+
+/// `sin(k x)` and `cos(k x)`, both from one pass.
+fn sine_and_cosine<B: ModelBackend>(x: Tensor<B, 2>, k: f64) -> (Tensor<B, 2>, Tensor<B, 2>) {
+    let none = Tensor::zeros([1, x.dims()[1]], &x.device());
+    let (sine, slope) = Activation::Sine { omega: k }.value_and_slope(x, none);
+    (sine, slope / k)
 }
 
 #[cfg(test)]

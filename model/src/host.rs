@@ -4,10 +4,11 @@
 use burn::tensor::TensorData;
 use burn::tensor::ops::FloatTensor;
 
+use crate::activation::Activation;
 use crate::backend::ModelBackend;
+use crate::jet::Lanes;
 use crate::kernel;
 use crate::machine::{self, Matrix};
-use crate::softplus::Lanes;
 
 /// Measured on networks from 128 to 512 wide (`model/benches/README.md`): twice as many are a little faster
 /// still on two cores, and leave nothing for the others of a machine with more.
@@ -41,11 +42,11 @@ fn jet<B: HostBackend>(
     z: FloatTensor<B>,
     bias: FloatTensor<B>,
     lanes: Lanes,
-    beta: f64,
+    activation: Activation,
 ) -> (FloatTensor<B>, FloatTensor<B>) {
     let [rows, columns] = B::shape(&z);
     let (out, slope) = B::read(&z, |z| {
-        B::read(&bias, |bias| kernel::jet(z, bias, lanes, beta as f32))
+        B::read(&bias, |bias| kernel::jet(z, bias, lanes, activation))
     });
     (
         B::from_rows(out, [rows, columns]),
@@ -55,15 +56,18 @@ fn jet<B: HostBackend>(
 
 fn jet_backward<B: HostBackend>(
     z: Option<FloatTensor<B>>,
+    out: FloatTensor<B>,
     slope: FloatTensor<B>,
     grad: FloatTensor<B>,
     lanes: Lanes,
-    beta: f64,
+    activation: Activation,
 ) -> FloatTensor<B> {
     let with_z = |z: &[f32]| {
-        B::read(&slope, |slope| {
-            B::read(&grad, |grad| {
-                kernel::jet_backward(z, slope, grad, lanes, beta as f32)
+        B::read(&out, |out| {
+            B::read(&slope, |slope| {
+                B::read(&grad, |grad| {
+                    kernel::jet_backward(z, out, slope, grad, lanes, activation)
+                })
             })
         })
     };
@@ -75,13 +79,16 @@ fn jet_backward<B: HostBackend>(
 }
 
 fn slope_backward<B: HostBackend>(
+    out: FloatTensor<B>,
     slope: FloatTensor<B>,
     grad: FloatTensor<B>,
-    beta: f64,
+    activation: Activation,
 ) -> FloatTensor<B> {
-    let by_z = B::read(&slope, |slope| {
-        B::read(&grad, |grad| {
-            kernel::slope_backward(slope, grad, beta as f32)
+    let by_z = B::read(&out, |out| {
+        B::read(&slope, |slope| {
+            B::read(&grad, |grad| {
+                kernel::slope_backward(out, slope, grad, activation)
+            })
         })
     });
     B::from_rows(by_z, B::shape(&grad))
@@ -97,31 +104,33 @@ macro_rules! on_the_host {
                 product::<Self>(a, b)
             }
 
-            fn softplus_jet(
+            fn activation_jet(
                 z: FloatTensor<Self>,
                 bias: FloatTensor<Self>,
                 lanes: Lanes,
-                beta: f64,
+                activation: Activation,
             ) -> (FloatTensor<Self>, FloatTensor<Self>) {
-                jet::<Self>(z, bias, lanes, beta)
+                jet::<Self>(z, bias, lanes, activation)
             }
 
-            fn softplus_jet_backward(
+            fn activation_jet_backward(
                 z: Option<FloatTensor<Self>>,
+                out: FloatTensor<Self>,
                 slope: FloatTensor<Self>,
                 grad: FloatTensor<Self>,
                 lanes: Lanes,
-                beta: f64,
+                activation: Activation,
             ) -> FloatTensor<Self> {
-                jet_backward::<Self>(z, slope, grad, lanes, beta)
+                jet_backward::<Self>(z, out, slope, grad, lanes, activation)
             }
 
-            fn softplus_slope_backward(
+            fn activation_slope_backward(
+                out: FloatTensor<Self>,
                 slope: FloatTensor<Self>,
                 grad: FloatTensor<Self>,
-                beta: f64,
+                activation: Activation,
             ) -> FloatTensor<Self> {
-                slope_backward::<Self>(slope, grad, beta)
+                slope_backward::<Self>(out, slope, grad, activation)
             }
         }
     };

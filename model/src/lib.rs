@@ -34,6 +34,7 @@ pub mod encoding;
 mod host;
 mod implicit_net;
 mod initial;
+pub mod jet;
 #[cfg(any(feature = "ndarray", feature = "flex"))]
 mod kernel;
 pub mod loss;
@@ -43,7 +44,6 @@ mod morph;
 mod objective;
 pub mod operators;
 mod product;
-pub mod softplus;
 pub mod trajectory;
 mod velocity_net;
 

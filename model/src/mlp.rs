@@ -13,8 +13,8 @@ use burn::tensor::{Tensor, TensorData};
 
 use crate::activation::Activation;
 use crate::backend::ModelBackend;
+use crate::jet::Lanes;
 use crate::product::product;
-use crate::softplus::Lanes;
 
 /// An affine layer, `x W + b`, of plain operations.
 ///

@@ -11,7 +11,7 @@ use burn_autodiff::grads::Gradients;
 use burn_autodiff::ops::{Backward, Ops, OpsKind};
 
 use crate::backend::ModelBackend;
-use crate::softplus::{primitive, tensor};
+use crate::jet::{primitive, tensor};
 
 /// `a b`.
 ///

@@ -10,7 +10,7 @@
 //! ```
 //!
 //! Value and lanes (three tangents, then a time tangent and the Laplacian where asked for) are stacked
-//! along the batch axis: one matrix product and one activation ([`crate::softplus`]) per layer, which one
+//! along the batch axis: one matrix product and one activation ([`crate::jet`]) per layer, which one
 //! level of autodiff differentiates by the weights.
 
 use burn::tensor::{Tensor, TensorData};
@@ -18,7 +18,7 @@ use burn::tensor::{Tensor, TensorData};
 use super::{VelocityJet, VelocityRequest};
 use crate::backend::ModelBackend;
 use crate::encoding::encoding_derivatives;
-use crate::softplus::Lanes;
+use crate::jet::Lanes;
 use crate::velocity_net::VelocityNet;
 
 /// `V`, `J`, and what `request` names, in one sweep.

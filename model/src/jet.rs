@@ -1,4 +1,4 @@
-//! The softplus activation with all that passes through a layer beside the value, as one operation that is
+//! An activation with all that passes through a layer beside the value, as one operation that is
 //! differentiable at every level of autodiff.
 //!
 //! Blocks of `n` rows are stacked along the batch axis: the value, then tangents, then a Laplacian. With
@@ -18,8 +18,7 @@
 //! d_l = s' g_l
 //! ```
 //!
-//! For the softplus `s'' = beta s' (1 - s')` and `s''' = beta s'' (1 - 2 s')`, so one exponential and one
-//! logarithm per element serve all of it. burn's own `softplus` takes `exp(beta z)`, which overflows.
+//! Only `s` and `s'` are evaluated: `s''` and `s'''` of every [`Activation`] are a few products of these.
 
 use burn::tensor::ops::FloatTensor;
 use burn::tensor::{Tensor, TensorPrimitive};
@@ -29,6 +28,7 @@ use burn_autodiff::checkpoint::strategy::CheckpointStrategy;
 use burn_autodiff::grads::Gradients;
 use burn_autodiff::ops::{Backward, Ops, OpsKind};
 
+use crate::activation::Activation;
 use crate::backend::ModelBackend;
 
 /// Directions of space, whose tangents the Laplacian is made from.
@@ -66,28 +66,12 @@ pub(crate) fn primitive<B: ModelBackend>(tensor: Tensor<B, 2>) -> FloatTensor<B>
     tensor.into_primitive().tensor()
 }
 
-/// Value and slope from ordinary tensor operations, with `e = exp(-|beta z|)` in `(0, 1]`.
-pub(crate) fn value_and_slope<B: ModelBackend>(
-    z: Tensor<B, 2>,
-    beta: f64,
-) -> (Tensor<B, 2>, Tensor<B, 2>) {
-    let e = (z.clone().abs() * -beta).exp();
-    let value = z.clone().clamp_min(0.0) + e.clone().log1p() / beta;
-    // slope = 1 / (1 + e) right of zero and e / (1 + e) left of it. Divided, not multiplied by `recip`:
-    // burn-ndarray's vectorised reciprocal is an approximation, good to 4e-5 only.
-    let numerator = e.clone().mask_fill(z.greater_equal_elem(0.0), 1.0);
-    let slope = numerator / (e + 1.0);
-    (value, slope)
-}
-
-/// `s''` from `s'`.
-pub(crate) fn curvature<B: ModelBackend>(slope: &Tensor<B, 2>, beta: f64) -> Tensor<B, 2> {
-    (slope.clone() - slope.clone() * slope.clone()) * beta
-}
-
 /// Rows of block `k`.
 pub(crate) fn block<B: ModelBackend>(stacked: &Tensor<B, 2>, k: usize, n: usize) -> Tensor<B, 2> {
-    let columns = stacked.dims()[1];
+    let [rows, columns] = stacked.dims();
+    if rows == n {
+        return stacked.clone();
+    }
     stacked.clone().slice([k * n..(k + 1) * n, 0..columns])
 }
 
@@ -97,57 +81,44 @@ fn squares<B: ModelBackend>(z: &Tensor<B, 2>, n: usize) -> Tensor<B, 2> {
     square(1) + square(2) + square(3)
 }
 
-/// All blocks behind an activation whose value, slope and curvature are known, from ordinary tensor
-/// operations.
-pub(crate) fn pass<B: ModelBackend>(
-    value: Tensor<B, 2>,
-    slope: &Tensor<B, 2>,
-    curvature: &Tensor<B, 2>,
-    z: &Tensor<B, 2>,
-    lanes: Lanes,
-) -> Tensor<B, 2> {
-    if lanes == Lanes::VALUE {
-        return value;
-    }
-    let n = value.dims()[0];
-    let mut blocks = vec![value];
-    for k in 1..lanes.blocks() {
-        let passed = block(z, k, n) * slope.clone();
-        blocks.push(if k > lanes.tangents {
-            passed + squares(z, n) * curvature.clone()
-        } else {
-            passed
-        });
-    }
-    Tensor::cat(blocks, 0)
-}
-
 /// What leaves the activation, and the slope, from ordinary tensor operations; the shapes are those of
-/// [`ModelBackend::softplus_jet`].
+/// [`ModelBackend::activation_jet`].
 pub(crate) fn composed_jet<B: ModelBackend>(
     z: Tensor<B, 2>,
     bias: Tensor<B, 2>,
     lanes: Lanes,
-    beta: f64,
+    activation: Activation,
 ) -> (Tensor<B, 2>, Tensor<B, 2>) {
     let n = z.dims()[0] / lanes.blocks();
-    let (value, slope) = value_and_slope(block(&z, 0, n) + bias, beta);
-    let out = pass(value, &slope, &curvature(&slope, beta), &z, lanes);
-    (out, slope)
+    let (value, slope) = activation.composed(block(&z, 0, n) + bias);
+    if lanes == Lanes::VALUE {
+        return (value, slope);
+    }
+    let mut blocks = vec![value];
+    for k in 1..lanes.blocks() {
+        let passed = block(&z, k, n) * slope.clone();
+        blocks.push(if k > lanes.tangents {
+            passed + squares(&z, n) * activation.curvature(&blocks[0], &slope)
+        } else {
+            passed
+        });
+    }
+    (Tensor::cat(blocks, 0), slope)
 }
 
 /// The gradient by what entered, from ordinary tensor operations; the shapes are those of
-/// [`ModelBackend::softplus_jet_backward`].
+/// [`ModelBackend::activation_jet_backward`].
 pub(crate) fn composed_jet_backward<B: ModelBackend>(
     z: Option<Tensor<B, 2>>,
+    out: &Tensor<B, 2>,
     slope: Tensor<B, 2>,
     grad: Tensor<B, 2>,
     lanes: Lanes,
-    beta: f64,
+    activation: Activation,
 ) -> Tensor<B, 2> {
     let Some(z) = z else { return grad * slope };
     let n = slope.dims()[0];
-    let curvature = curvature(&slope, beta);
+    let curvature = activation.curvature(out, &slope);
     let mut blocks: Vec<_> = (0..lanes.blocks())
         .map(|k| block(&grad, k, n) * slope.clone())
         .collect();
@@ -157,7 +128,7 @@ pub(crate) fn composed_jet_backward<B: ModelBackend>(
     }
     if lanes.laplacian {
         let by_laplacian = block(&grad, lanes.tangents + 1, n);
-        let third = curvature.clone() * (slope * -2.0 + 1.0) * beta;
+        let third = activation.third(slope, curvature.clone());
         blocks[0] = blocks[0].clone() + squares(&z, n) * by_laplacian.clone() * third;
         for (k, tangent) in blocks.iter_mut().enumerate().skip(1).take(SPATIAL) {
             let bent = block(&z, k, n) * by_laplacian.clone() * curvature.clone();
@@ -169,39 +140,44 @@ pub(crate) fn composed_jet_backward<B: ModelBackend>(
 
 /// The gradient by what entered, from that by the slope, from ordinary tensor operations.
 pub(crate) fn composed_slope_backward<B: ModelBackend>(
-    slope: Tensor<B, 2>,
+    out: &Tensor<B, 2>,
+    slope: &Tensor<B, 2>,
     grad: Tensor<B, 2>,
-    beta: f64,
+    activation: Activation,
 ) -> Tensor<B, 2> {
-    curvature(&slope, beta) * grad
+    activation.curvature(out, slope) * grad
+}
+
+/// What the backward passes of a jet need: tensors of the level below, tracked there.
+#[derive(Clone, Debug)]
+struct Passed<B: ModelBackend> {
+    /// What entered, only where there are tangents.
+    z: Option<FloatTensor<B>>,
+    /// What left.
+    out: FloatTensor<B>,
+    slope: FloatTensor<B>,
+    lanes: Lanes,
+    activation: Activation,
 }
 
 /// The backward pass of what leaves the activation.
 #[derive(Debug)]
 struct JetBackward;
 
-/// What it needs: tensors of the level below, tracked there; `z` only where there are tangents.
-#[derive(Clone, Debug)]
-struct JetState<B: ModelBackend> {
-    z: Option<FloatTensor<B>>,
-    slope: FloatTensor<B>,
-    lanes: Lanes,
-    beta: f64,
-}
-
 impl<B: ModelBackend> Backward<B, 2> for JetBackward {
-    type State = JetState<B>;
+    type State = Passed<B>;
 
     fn backward(self, ops: Ops<Self::State, 2>, grads: &mut Gradients, _: &mut Checkpointer) {
         let grad = grads.consume::<B>(&ops.node);
-        let JetState {
+        let Passed {
             z,
+            out,
             slope,
             lanes,
-            beta,
+            activation,
         } = ops.state;
         let n = tensor::<B>(slope.clone()).dims()[0];
-        let by_z = B::softplus_jet_backward(z, slope, grad, lanes, beta);
+        let by_z = B::activation_jet_backward(z, out, slope, grad, lanes, activation);
         let [z, bias] = ops.parents;
         if let Some(bias) = bias {
             let by_bias = block(&tensor::<B>(by_z.clone()), 0, n).sum_dim(0);
@@ -218,13 +194,18 @@ impl<B: ModelBackend> Backward<B, 2> for JetBackward {
 struct SlopeBackward;
 
 impl<B: ModelBackend> Backward<B, 2> for SlopeBackward {
-    /// The slope, the sharpness, and how many blocks entered.
-    type State = (FloatTensor<B>, f64, usize);
+    type State = Passed<B>;
 
     fn backward(self, ops: Ops<Self::State, 2>, grads: &mut Gradients, _: &mut Checkpointer) {
         let grad = grads.consume::<B>(&ops.node);
-        let (slope, beta, blocks) = ops.state;
-        let by_value = tensor::<B>(B::softplus_slope_backward(slope, grad, beta));
+        let Passed {
+            out,
+            slope,
+            lanes,
+            activation,
+            ..
+        } = ops.state;
+        let by_value = tensor::<B>(B::activation_slope_backward(out, slope, grad, activation));
         let [z, bias] = ops.parents;
         if let Some(bias) = bias {
             grads.register::<B>(bias.id, primitive(by_value.clone().sum_dim(0)));
@@ -232,7 +213,7 @@ impl<B: ModelBackend> Backward<B, 2> for SlopeBackward {
         if let Some(z) = z {
             let mut rows = vec![by_value];
             // The slope does not depend on the other blocks.
-            for _ in 1..blocks {
+            for _ in 1..lanes.blocks() {
                 rows.push(rows[0].zeros_like());
             }
             grads.register::<B>(z.id, primitive(Tensor::cat(rows, 0)));
@@ -243,33 +224,32 @@ impl<B: ModelBackend> Backward<B, 2> for SlopeBackward {
 /// What leaves an activation, and its slope.
 type Pair<B> = (FloatTensor<B>, FloatTensor<B>);
 
-/// [`ModelBackend::softplus_jet`] one level up: the pair of the level below, tracked.
+/// [`ModelBackend::activation_jet`] one level up: the pair of the level below, tracked.
 pub(crate) fn tracked_jet<B: ModelBackend, C: CheckpointStrategy>(
     z: FloatTensor<Autodiff<B, C>>,
     bias: FloatTensor<Autodiff<B, C>>,
     lanes: Lanes,
-    beta: f64,
+    activation: Activation,
 ) -> Pair<Autodiff<B, C>> {
     let entered = (lanes != Lanes::VALUE).then(|| z.primitive.clone());
-    let (out, slope) = B::softplus_jet(z.primitive, bias.primitive, lanes, beta);
+    let (out, slope) = B::activation_jet(z.primitive, bias.primitive, lanes, activation);
     let nodes = [z.node, bias.node];
+    let passed = |z| Passed {
+        z,
+        out: out.clone(),
+        slope: slope.clone(),
+        lanes,
+        activation,
+    };
     let prepared = Backward::<B, 2>::prepare::<C>(JetBackward, nodes.clone());
     let tracked_out = match prepared.compute_bound().stateful() {
-        OpsKind::Tracked(step) => {
-            let state = JetState {
-                z: entered,
-                slope: slope.clone(),
-                lanes,
-                beta,
-            };
-            step.finish(state, out)
-        }
-        OpsKind::UnTracked(step) => step.finish(out),
+        OpsKind::Tracked(step) => step.finish(passed(entered), out.clone()),
+        OpsKind::UnTracked(step) => step.finish(out.clone()),
     };
     let prepared = Backward::<B, 2>::prepare::<C>(SlopeBackward, nodes);
     let tracked_slope = match prepared.compute_bound().stateful() {
-        OpsKind::Tracked(step) => step.finish((slope.clone(), beta, lanes.blocks()), slope),
-        OpsKind::UnTracked(step) => step.finish(slope),
+        OpsKind::Tracked(step) => step.finish(passed(None), slope.clone()),
+        OpsKind::UnTracked(step) => step.finish(slope.clone()),
     };
     (tracked_out, tracked_slope)
 }
@@ -277,10 +257,14 @@ pub(crate) fn tracked_jet<B: ModelBackend, C: CheckpointStrategy>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{Plain, Train, assert_close, host, numbers};
+    use crate::testing::{Plain, Train, assert_close, column, host, numbers};
     use burn::tensor::Distribution;
 
-    const BETA: f64 = 3.0;
+    const SHARP: f64 = 3.0;
+    const ACTIVATIONS: [Activation; 2] = [
+        Activation::Softplus { beta: SHARP },
+        Activation::Sine { omega: SHARP },
+    ];
     const ALL: [Lanes; 5] = [
         Lanes::VALUE,
         Lanes {
@@ -301,47 +285,71 @@ mod tests {
         },
     ];
 
-    fn jet<B: ModelBackend>(z: &Tensor<B, 2>, bias: &Tensor<B, 2>, lanes: Lanes) -> Tensors<B> {
+    fn jet<B: ModelBackend>(
+        z: &Tensor<B, 2>,
+        bias: &Tensor<B, 2>,
+        lanes: Lanes,
+        activation: Activation,
+    ) -> Tensors<B> {
         let (z, bias) = (primitive(z.clone()), primitive(bias.clone()));
-        let (out, slope) = B::softplus_jet(z, bias, lanes, BETA);
+        let (out, slope) = B::activation_jet(z, bias, lanes, activation);
         (tensor(out), tensor(slope))
     }
 
     /// What leaves, and the slope.
     type Tensors<B> = (Tensor<B, 2>, Tensor<B, 2>);
 
+    /// Every activation with every kind of lanes.
+    fn kinds() -> impl Iterator<Item = (Activation, Lanes)> {
+        ACTIVATIONS
+            .into_iter()
+            .flat_map(|activation| ALL.map(|lanes| (activation, lanes)))
+    }
+
+    fn assert_composed<B: ModelBackend>(activation: Activation, lanes: Lanes, [n, c]: [usize; 2]) {
+        let z = numbers::<B>(lanes.blocks() * n, c, 0.3);
+        let bias = numbers(1, c, 0.8);
+        let (out, slope) = jet(&z, &bias, lanes, activation);
+        let (wanted, wanted_slope) = composed_jet(z.clone(), bias, lanes, activation);
+        let label = format!(
+            "{}: {activation:?}, {lanes:?}, {n} x {c}",
+            B::name(&Default::default())
+        );
+        // Both in f32, results up to 5, terms up to 30, and slopes of the sine up to 3.
+        assert_close(host(out.clone()), host(wanted), 1e-5, &label);
+        assert_close(host(slope.clone()), host(wanted_slope), 2e-6, &label);
+        let grad = numbers(lanes.blocks() * n, c, 2.1);
+        let entered = (lanes != Lanes::VALUE).then(|| z.clone());
+        let by_z = B::activation_jet_backward(
+            entered.clone().map(primitive),
+            primitive(out.clone()),
+            primitive(slope.clone()),
+            primitive(grad.clone()),
+            lanes,
+            activation,
+        );
+        let wanted = composed_jet_backward(entered, &out, slope.clone(), grad, lanes, activation);
+        // Terms up to 100.
+        assert_close(host(tensor::<B>(by_z)), host(wanted), 3e-5, &label);
+        let grad = numbers(n, c, 1.1);
+        let by_z = B::activation_slope_backward(
+            primitive(out.clone()),
+            primitive(slope.clone()),
+            primitive(grad.clone()),
+            activation,
+        );
+        let wanted = composed_slope_backward(&out, &slope, grad, activation);
+        assert_close(host(tensor::<B>(by_z)), host(wanted), 1e-5, &label);
+    }
+
     #[test]
     fn the_kernels_are_the_composed_operations() {
         // Small, and larger than a piece of the kernel.
-        for (n, c) in [(3, 5), (700, 70)] {
-            for lanes in ALL {
-                let z = numbers::<Plain>(lanes.blocks() * n, c, 0.3);
-                let bias = numbers(1, c, 0.8);
-                let (out, slope) = jet(&z, &bias, lanes);
-                let (wanted, wanted_slope) = composed_jet(z.clone(), bias, lanes, BETA);
-                let label = format!("{lanes:?}, {n} x {c}");
-                // Both in f32, results up to 5, terms up to 30.
-                assert_close(host(out), host(wanted), 1e-5, &label);
-                assert_close(host(slope.clone()), host(wanted_slope), 1e-6, &label);
-                let grad = numbers(lanes.blocks() * n, c, 2.1);
-                let entered = (lanes != Lanes::VALUE).then(|| z.clone());
-                let by_z = Plain::softplus_jet_backward(
-                    entered.clone().map(primitive),
-                    primitive(slope.clone()),
-                    primitive(grad.clone()),
-                    lanes,
-                    BETA,
-                );
-                let wanted = composed_jet_backward(entered, slope.clone(), grad, lanes, BETA);
-                assert_close(host(tensor::<Plain>(by_z)), host(wanted), 3e-5, &label);
-                let grad = numbers(n, c, 1.1);
-                let by_z = Plain::softplus_slope_backward(
-                    primitive(slope.clone()),
-                    primitive(grad.clone()),
-                    BETA,
-                );
-                let wanted = composed_slope_backward(slope, grad, BETA);
-                assert_close(host(tensor::<Plain>(by_z)), host(wanted), 1e-5, &label);
+        for shape in [[3, 5], [700, 70]] {
+            for (activation, lanes) in kinds() {
+                assert_composed::<Plain>(activation, lanes, shape);
+                #[cfg(feature = "flex")]
+                assert_composed::<burn_flex::Flex>(activation, lanes, shape);
             }
         }
     }
@@ -350,18 +358,18 @@ mod tests {
     fn mixed<B: ModelBackend>(
         z: &Tensor<B, 2>,
         bias: &Tensor<B, 2>,
-        lanes: Lanes,
+        (activation, lanes): (Activation, Lanes),
         weights: &Tensor<B, 2>,
         of_slope: &Tensor<B, 2>,
     ) -> Tensor<B, 1> {
-        let (out, slope) = jet(z, bias, lanes);
+        let (out, slope) = jet(z, bias, lanes, activation);
         (out * weights.clone()).sum() + (slope * of_slope.clone()).sum()
     }
 
     #[test]
     fn the_first_and_second_derivatives_are_those_of_the_composed_operations() {
         let (n, c) = (2, 3);
-        for lanes in ALL {
+        for (activation, lanes) in kinds() {
             let rows = lanes.blocks() * n;
             let up = |x: Tensor<Plain, 2>| Tensor::<Train, 2>::from_inner(x).require_grad();
             let gradients = |composed: bool| {
@@ -376,10 +384,10 @@ mod tests {
                 let (weights, of_slope) = (numbers(rows, c, 2.2), numbers(n, c, 1.2));
                 let (weights, of_slope) = (constant(weights), constant(of_slope));
                 let value = if composed {
-                    let (out, slope) = composed_jet(z2.clone(), bias2.clone(), lanes, BETA);
+                    let (out, slope) = composed_jet(z2.clone(), bias2.clone(), lanes, activation);
                     (out * weights).sum() + (slope * of_slope).sum()
                 } else {
-                    mixed(&z2, &bias2, lanes, &weights, &of_slope)
+                    mixed(&z2, &bias2, (activation, lanes), &weights, &of_slope)
                 };
                 let mut first = value.backward();
                 let by_z = z2.grad_remove(&mut first).expect("depends on z");
@@ -397,8 +405,14 @@ mod tests {
             };
             let names = ["by z", "by the bias", "twice by z", "twice by the bias"];
             for ((a, b), name) in gradients(false).into_iter().zip(gradients(true)).zip(names) {
-                // Both in f32; the second derivatives are sums of terms up to beta^3.
-                assert_close(a, b, 2e-4, &format!("{lanes:?} {name}"));
+                // Both in f32: units in the last place of the largest terms.
+                let largest = b.iter().fold(0.0, |most: f64, b| most.max(b.abs()));
+                assert_close(
+                    a,
+                    b,
+                    2e-4_f64.max(1e-6 * largest),
+                    &format!("{activation:?} {lanes:?} {name}"),
+                );
             }
         }
     }
@@ -414,23 +428,62 @@ mod tests {
         };
         let rows = [z0, z1, 0.0, 0.0, zl].map(|z| [z as f32]);
         let z = Tensor::<Plain, 2>::from_floats(rows, &Default::default());
-        let out = host(jet(&z, &z.zeros_like().slice([0..1, 0..1]), lanes).0);
-        let soft = |z: f64| (BETA * z).exp().ln_1p() / BETA;
-        let at = |s: f64| soft(z0 + z1 * s + zl * s * s / 2.0);
-        let h = 1e-4;
-        let (slope, bend) = (
-            (at(h) - at(-h)) / (2.0 * h),
-            (at(h) - 2.0 * at(0.0) + at(-h)) / (h * h),
-        );
-        // Central differences in float64: h^2 and 1e-16 / h^2 are 1e-8; f32 rounding is the larger.
-        assert_close(out, vec![at(0.0), slope, 0.0, 0.0, bend], 1e-6, "curve");
+        let functions: [fn(f64) -> f64; 2] =
+            [|z| (SHARP * z).exp().ln_1p() / SHARP, |z| (SHARP * z).sin()];
+        for (activation, function) in ACTIVATIONS.into_iter().zip(functions) {
+            let out = host(jet(&z, &z.zeros_like().slice([0..1, 0..1]), lanes, activation).0);
+            let at = |s: f64| function(z0 + z1 * s + zl * s * s / 2.0);
+            let h = 1e-4;
+            let (slope, bend) = (
+                (at(h) - at(-h)) / (2.0 * h),
+                (at(h) - 2.0 * at(0.0) + at(-h)) / (h * h),
+            );
+            let label = format!("{activation:?}");
+            // Central differences in float64: h^2 and 1e-16 / h^2 are 1e-8; f32 rounding is the larger.
+            assert_close(out, vec![at(0.0), slope, 0.0, 0.0, bend], 1e-6, &label);
+        }
+    }
+
+    #[test]
+    fn the_written_gradients_are_differences_of_what_leaves() {
+        // One row of everything, each number of which is moved by h.
+        let lanes = ALL[4];
+        let (rows, h) = (lanes.blocks(), 4e-3);
+        let (z, bias) = (numbers::<Plain>(rows, 1, 0.3), numbers(1, 1, 0.8));
+        let weights = numbers::<Plain>(rows, 1, 2.1);
+        let by_out = host(weights.clone());
+        for activation in ACTIVATIONS {
+            let (out, slope) = jet(&z, &bias, lanes, activation);
+            let (entered, grad) = (Some(primitive(z.clone())), primitive(weights.clone()));
+            let (out, slope) = (primitive(out), primitive(slope));
+            let by_z = Plain::activation_jet_backward(entered, out, slope, grad, lanes, activation);
+            let at = |moved: usize, by: f64| -> f64 {
+                let mut values = host(z.clone());
+                values[moved] += by;
+                let out = jet(&column(&values), &bias, lanes, activation).0;
+                host(out)
+                    .iter()
+                    .zip(&by_out)
+                    .map(|(out, by)| out * by)
+                    .sum()
+            };
+            let wanted = (0..rows)
+                .map(|k| (at(k, h) - at(k, -h)) / (2.0 * h))
+                .collect();
+            let label = format!("{activation:?}");
+            // Truncation: h^2 / 6 times a third derivative, up to 3^2 times the gradient of 44; f32 rounding
+            // over h is smaller.
+            assert_close(host(tensor::<Plain>(by_z)), wanted, 3e-3, &label);
+        }
     }
 
     #[test]
     fn nothing_in_gives_nothing_out() {
         let none = Tensor::<Plain, 2>::random([0, 4], Distribution::Default, &Default::default());
         let bias = Tensor::zeros([1, 4], &Default::default());
-        let (out, slope) = jet(&none, &bias, Lanes::VALUE);
-        assert_eq!((out.dims(), slope.dims()), ([0, 4], [0, 4]));
+        for activation in ACTIVATIONS {
+            let (out, slope) = jet(&none, &bias, Lanes::VALUE, activation);
+            assert_eq!((out.dims(), slope.dims()), ([0, 4], [0, 4]));
+        }
     }
 }
