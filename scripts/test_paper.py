@@ -206,7 +206,7 @@ class Experiments(unittest.TestCase):
         self.assertEqual(status, 0)
         self.assertEqual(set(self.folder.rglob("*")), before)
         self.assertEqual(out.count(" compare --sequence "), 18)
-        self.assertIn("# errors: 41 runs", out)
+        self.assertIn("# errors: 46 runs", out)
 
     def test_the_commands_of_a_dry_run_are_those_that_are_run(self):
         _, out, _ = self.paper("topology", "--dry-run")

@@ -3,7 +3,8 @@
 //!
 //! A reader's path: `main.rs`, [`cli`] (`train.rs`), [`learner`] (`mod.rs`, `step.rs`), then the terms and
 //! operators in [`isomorph_model`]. Arrows run one way: `cli -> learner -> model`,
-//! `cli -> surface -> model`, `cli -> evaluate -> shape`, `cli -> compare -> evaluate`.
+//! `cli -> surface -> model`, `cli -> evaluate -> shape`, `cli -> matching -> shape`,
+//! `cli -> compare -> evaluate`.
 
 // The thrice lifted autodiff types nest deeper than the default limit allows.
 #![recursion_limit = "256"]
@@ -14,6 +15,7 @@ pub mod cli;
 pub mod compare;
 pub mod evaluate;
 pub mod learner;
+pub mod matching;
 pub mod recipe;
 pub mod report;
 pub mod run_directory;

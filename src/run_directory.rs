@@ -1,7 +1,7 @@
 //! The folder of one run: where everything lies in it, and how it is created without harm to another.
 //!
 //! ```text
-//! recipe.toml  metrics.jsonl  run.log  checkpoints/  meshes/
+//! recipe.toml  pairs.csv (where they were to be found)  metrics.jsonl  run.log  checkpoints/  meshes/
 //! ```
 
 use std::fs;
@@ -94,6 +94,11 @@ impl RunDirectory {
         self.0.join("recipe.toml")
     }
 
+    /// The pairs that were found by matching.
+    pub fn pairs(&self) -> PathBuf {
+        self.0.join("pairs.csv")
+    }
+
     /// The folder of checkpoints.
     pub fn checkpoints(&self) -> PathBuf {
         self.0.join("checkpoints")
@@ -111,7 +116,9 @@ impl RunDirectory {
                 fs::remove_dir_all(folder)?;
             }
         }
-        for file in ["metrics.jsonl", "run.log", "report.html", "recipe.toml"] {
+        let files = ["metrics.jsonl", "run.log", "report.html", "pairs.csv"];
+        // The recipe last: without it this is no run that another try may replace.
+        for file in files.into_iter().chain(["recipe.toml"]) {
             match fs::remove_file(self.0.join(file)) {
                 Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
                 _ => {}

@@ -14,6 +14,7 @@
 //! | `V(x)`, `V(x, t)` | [`VelocityNet::forward`] | `[n, 3]` |
 //! | `J = dV/dx`, `div V`, Laplacian of `V` | [`operators::VelocityJet`] | `[n, 3, 3]`, `[n, 1]`, `[n, 3]` |
 //! | `phi(x, t)` | [`trajectory::integrate`] | `[n, 3]` |
+//! | `f(x, t)` of two end fields carried by `V` | [`FlowGeometry`] | `[n, 1]` |
 //! | `gamma(x)`, positional encoding | [`encoding::encode`] | `[n, 3 (2 m + 1)]` |
 //! | `L_f`, `L_v`, `L_m` | one file per term in [`loss`], summed by [`Objective`] | `[1]` |
 //! | the methods compared with | one file each in [`baseline`], seen as [`Geometry`] or [`Motion`] | |
@@ -30,6 +31,7 @@ pub mod activation;
 pub mod backend;
 pub mod baseline;
 pub mod encoding;
+mod flow;
 #[cfg(any(feature = "ndarray", feature = "flex"))]
 mod host;
 mod implicit_net;
@@ -48,6 +50,7 @@ pub mod trajectory;
 mod velocity_net;
 
 pub use backend::{ModelBackend, TrainBackend};
+pub use flow::FlowGeometry;
 pub use implicit_net::{ImplicitNet, ImplicitNetConfig};
 pub use machine::without_denormals;
 pub use mlp::{Mlp, MlpConfig};

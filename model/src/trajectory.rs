@@ -18,6 +18,8 @@
 use burn::tensor::Tensor;
 use burn::tensor::backend::Backend;
 
+use crate::operators::length;
+
 /// An explicit Runge-Kutta method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Integrator {
@@ -72,6 +74,37 @@ pub fn integrate<B: Backend>(
         t = t + h;
     }
     y
+}
+
+/// The least power of two of even steps at which nineteen states in twenty end no farther than
+/// `tolerance` from where twice the steps take them; `most` where even that many do not do.
+///
+/// # Shapes
+/// As for [`integrate`].
+pub fn steps_within<B: Backend>(
+    rhs: impl Fn(Tensor<B, 2>, Tensor<B, 2>) -> Tensor<B, 2>,
+    state: Tensor<B, 2>,
+    from: Tensor<B, 2>,
+    to: Tensor<B, 2>,
+    integrator: Integrator,
+    tolerance: f64,
+    most: usize,
+) -> usize {
+    let end = |count| {
+        let (state, from, to) = (state.clone(), from.clone(), to.clone());
+        integrate(&rhs, state, from, to, Steps::Even(count), integrator)
+    };
+    let (mut count, mut coarse) = (1, end(1));
+    while count < most {
+        let fine = end(2 * count);
+        let off = length(fine.clone() - coarse).into_data();
+        let within = off.iter::<f64>().filter(|off| *off <= tolerance).count();
+        if 20 * within >= 19 * off.num_elements() {
+            return count;
+        }
+        (count, coarse) = (2 * count, fine);
+    }
+    most
 }
 
 /// One step of length `h`, `[n, 1]`.
@@ -157,6 +190,40 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn the_steps_that_keep_within_a_tolerance_are_as_few_as_do() {
+        let start = || points(&[[1.0, 0.0, 0.0]]);
+        for (integrator, _) in METHODS {
+            for tolerance in [1e-2, 1e-3] {
+                let count = steps_within(
+                    turn,
+                    start(),
+                    column(&[0.0]),
+                    column(&[1.0]),
+                    integrator,
+                    tolerance,
+                    1024,
+                );
+                let at = |count| error(Steps::Even(count), integrator, 0.0, 1.0);
+                // The distance to twice the steps is between half of the error and all of it.
+                assert!(at(count) <= 2.1 * tolerance, "{integrator:?}: {count}");
+                let fewer = count / 2;
+                let enough = fewer > 0 && at(fewer) < 0.9 * tolerance;
+                assert!(!enough, "{integrator:?}: {fewer} would do");
+            }
+        }
+        let few = steps_within(
+            turn,
+            start(),
+            column(&[0.0]),
+            column(&[1.0]),
+            Integrator::Euler,
+            1e-6,
+            4,
+        );
+        assert_eq!(few, 4, "no more than allowed");
     }
 
     #[test]

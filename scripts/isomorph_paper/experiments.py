@@ -26,9 +26,20 @@ class Size:
     batch: int
     every: int
     """Every so many frames are evaluated where an experiment does not need them all."""
+    network: tuple[str, ...] = ()
+    """What makes `ours` one network f(x, t), where the terms of that geometry are studied."""
 
 
-SMALL = Size("small", "quick", 1_000, 2_200, every=3)
+NETWORK = (
+    "implicit.geometry=network",
+    "implicit.activation=softplus",
+    "implicit.beta=100",
+    "velocity.time-dependent=false",
+    "loss.screw=0",
+    "training.learning-rate=2e-3",
+    "training.velocity-until=0.7",
+)
+SMALL = Size("small", "quick", 1_000, 2_200, every=3, network=NETWORK)
 FULL = Size("full", "paper", 10_000, 4_000, every=1)
 
 
@@ -85,6 +96,8 @@ class Experiment:
     logarithmic: bool = False
     keys: tuple[str, ...] = ()
     all_frames: bool = False
+    network: bool = False
+    """Whether the terms under study are those of one network f(x, t)."""
 
     def rows_at(self, size: Size) -> list[Row]:
         return [row for row in self.rows if row.size in (None, size.name)]
@@ -144,6 +157,7 @@ EXPERIMENTS = (
         (FOX, BEAR),
         (
             Row("quick", "quick"),
+            Row("quick (one network)", "quick", NETWORK, size="small"),
             Row("default", "default", size="full"),
             Row("paper", "paper", size="full"),
             Row("paper (small networks)", "paper", SMALL_NETWORKS, size="small"),
@@ -196,6 +210,7 @@ EXPERIMENTS = (
             Row("MLSE: terms of the paper alone", keys=("loss.level-set-form=mlse", *PAPER_TERMS)),
             Row("OLSE: terms of the paper alone", keys=("loss.level-set-form=olse", *PAPER_TERMS)),
         ),
+        network=True,
     ),
     Experiment(
         "divergence",
@@ -258,7 +273,8 @@ EXPERIMENTS = (
         (FOX_HEAD, ARMS),
         (
             Row("5 % known"),
-            Row("none known", keys=("data.correspondences=none",)),
+            Row("none known: found by match", keys=("data.correspondences=match",)),
+            Row("none known: none sought", keys=("data.correspondences=none",)),
             Row("lipmlp", "lipmlp"),
             Row("nise", "nise"),
         ),

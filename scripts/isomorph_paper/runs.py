@@ -68,8 +68,10 @@ def pairs_of(row: Row, subject: Subject) -> tuple[Pair, ...]:
 
 def variant(row: Row, experiment: Experiment, size: Size, data: tuple[str, ...]) -> str:
     """LABEL=METHOD,section.key=value,...: a row's own keys come after those of the experiment."""
-    method = size.ours if row.method == OURS else row.method
-    return ",".join([f"{row.label}={method}", *experiment.keys, *data, *row.keys])
+    ours = row.method == OURS
+    method = size.ours if ours else row.method
+    network = size.network if ours and experiment.network else ()
+    return ",".join([f"{row.label}={method}", *network, *experiment.keys, *data, *row.keys])
 
 
 def command(

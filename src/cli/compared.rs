@@ -1,6 +1,6 @@
 //! One method on one pair of a comparison: trained, or its training gone on with, and measured.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
@@ -19,6 +19,13 @@ use crate::recipe::Recipe;
 use crate::report::Reporter;
 use crate::run_directory::RunDirectory;
 use crate::shape::{Normalisation, Pair};
+
+/// The pairs that a run made with this recipe has found, if it is there to be gone on with.
+pub(super) fn stored_pairs(path: &Path, recipe: &Recipe) -> Option<PathBuf> {
+    let run = RunDirectory::open(path).ok()?;
+    let same = Recipe::read(&run.recipe(), &[]).is_ok_and(|before| before == *recipe);
+    same.then(|| run.pairs())
+}
 
 /// The run in a folder if it was made with this recipe, with its newest checkpoint; else a new one.
 pub(super) fn open_or_create(

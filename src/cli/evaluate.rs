@@ -91,7 +91,8 @@ pub(super) fn run(args: EvaluateArgs) -> Result<Ending> {
     let recipe = checkpoint.recipe()?;
     let truth = GroundTruth::read(&args.ground_truth)?;
     let span = truth.span(args.from, args.to)?;
-    let pair = shape::prepare(&settings::data(&recipe))?;
+    // Only the points are looked at: what corresponds to what plays no part.
+    let pair = shape::prepare(&settings::data(&recipe, None))?;
     let (source, target) = (&pair.source.points, &pair.target.points);
     truth.check_ends(span, &pair.normalisation, source, target)?;
     let normalisation = true_frame(&truth, span)?;

@@ -21,7 +21,7 @@ pub(super) struct InitArgs {
     /// The shape at time 1
     target: PathBuf,
 
-    /// Known pairs of vertices: a CSV file of source_index,target_index lines, same-vertices, or none
+    /// Known pairs of vertices: a CSV file of source_index,target_index lines, same-vertices, match (found before training), or none
     #[arg(long, value_name = "FILE", default_value = "none")]
     correspondences: String,
 
@@ -44,6 +44,7 @@ pub(super) fn run(args: InitArgs) -> Result<Ending> {
     let correspondences = match args.correspondences.as_str() {
         "none" => Correspondences::None,
         "same-vertices" => Correspondences::SameVertices,
+        "match" => Correspondences::Match,
         file => Correspondences::File(PathBuf::from(file)),
     };
     let text = Recipe::commented(&args.source, &args.target, &correspondences, preset)?;

@@ -11,6 +11,8 @@ mod evaluate;
 mod extract;
 mod info;
 mod init;
+mod match_shapes;
+mod paired;
 mod resume;
 mod train;
 mod trained;
@@ -25,6 +27,7 @@ use clap::{Args, Parser, Subcommand};
 use crate::backend::{BackendError, BackendName};
 use crate::compare::PlanError;
 use crate::evaluate::TruthError;
+use crate::matching::MatchError;
 use crate::recipe::RecipeError;
 use crate::report::Verbosity;
 use crate::run_directory::RunError;
@@ -52,6 +55,7 @@ enum Command {
     Extract(extract::ExtractArgs),
     Evaluate(evaluate::EvaluateArgs),
     Compare(compare::CompareArgs),
+    Match(match_shapes::MatchArgs),
     Init(init::InitArgs),
     Info(info::InfoArgs),
     Bench(bench::BenchArgs),
@@ -113,6 +117,7 @@ pub fn run(cli: Cli) -> ExitCode {
         Command::Extract(args) => extract::run(args),
         Command::Evaluate(args) => evaluate::run(args),
         Command::Compare(args) => compare::run(args),
+        Command::Match(args) => match_shapes::run(args),
         Command::Init(args) => init::run(args),
         Command::Info(args) => info::run(args),
         Command::Bench(args) => bench::run(args),
@@ -138,6 +143,10 @@ fn is_usage(error: &anyhow::Error) -> bool {
             || cause.is::<Usage>()
             || cause.is::<PlanError>()
             || cause.is::<GridError>()
+            || matches!(
+                cause.downcast_ref::<MatchError>(),
+                Some(MatchError::Option { .. })
+            )
             || matches!(
                 cause.downcast_ref::<TruthError>(),
                 Some(TruthError::Span { .. } | TruthError::Option { .. })

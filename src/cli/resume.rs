@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::Args;
 
+use super::paired;
 use super::training::Training;
 use super::{BackendArgs, Ending, QuietArgs, SetArgs};
 use crate::atomic::write_atomically;
@@ -12,11 +13,9 @@ use crate::backend;
 use crate::learner;
 use crate::learner::checkpoint::{Checkpoint, CheckpointError};
 use crate::learner::event::Event;
-use crate::learner::settings;
 use crate::recipe::Recipe;
 use crate::report::Reporter;
 use crate::run_directory::RunDirectory;
-use crate::shape;
 
 /// Go on with a run that was interrupted, or train it for longer
 ///
@@ -52,15 +51,19 @@ pub(super) fn run(args: ResumeArgs) -> Result<Ending> {
         None => Vec::new(),
     };
     backend::check(args.place.backend, args.place.device.as_deref())?;
-    let pair = shape::prepare(&settings::data(&recipe))?;
+    let prepared = paired::prepare(&recipe, Some(&run.pairs()), args.quiet.verbosity())?;
+    let pair = &prepared.pair;
     if let Some(checkpoint) = &checkpoint {
         // Before anything is written: what is refused leaves the run as it was.
-        learner::fits(checkpoint, &recipe, &pair)?;
+        learner::fits(checkpoint, &recipe, pair)?;
     }
     let step = checkpoint
         .as_ref()
         .map_or(0, |checkpoint| checkpoint.state.step);
     let mut reporter = Reporter::new(&run, Some(step), args.quiet.verbosity())?;
+    if let Some(matched) = prepared.keep(&run)? {
+        reporter.handle(&matched)?;
+    }
     if checkpoint.is_none() {
         let note = "no checkpoint yet: the run starts again from its first step";
         reporter.handle(&Event::Note(note.to_owned()))?;
@@ -76,7 +79,7 @@ pub(super) fn run(args: ResumeArgs) -> Result<Ending> {
     }
     Training {
         recipe,
-        pair,
+        pair: prepared.pair,
         run,
         checkpoint,
         reporter,

@@ -5,16 +5,15 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use clap::Args;
 
+use super::paired;
 use super::trained;
 use super::training::Training;
 use super::{BackendArgs, Ending, QuietArgs, SetArgs};
 use crate::backend;
 use crate::learner::event::Event;
-use crate::learner::settings;
 use crate::recipe::Recipe;
 use crate::report::Reporter;
 use crate::run_directory::RunDirectory;
-use crate::shape;
 
 /// Train on the two shapes of a recipe, and write a few surfaces in between
 ///
@@ -48,11 +47,15 @@ pub(super) fn run(args: TrainArgs) -> Result<Ending> {
     let recipe = Recipe::read(&args.recipe, &args.set.overrides)?;
     // Before the run's folder exists: what cannot be read or opened leaves nothing behind.
     backend::check(args.place.backend, args.place.device.as_deref())?;
-    let pair = shape::prepare(&settings::data(&recipe))?;
-    trained::check(&recipe, &pair)?;
+    let prepared = paired::prepare(&recipe, None, args.quiet.verbosity())?;
+    trained::check(&recipe, &prepared.pair)?;
     let path = args.run.unwrap_or_else(|| default_run(&args.recipe));
     let run = RunDirectory::create(&path, &recipe.to_toml(), args.force)?;
     let mut reporter = Reporter::new(&run, None, args.quiet.verbosity())?;
+    if let Some(matched) = prepared.keep(&run)? {
+        reporter.handle(&matched)?;
+    }
+    let pair = prepared.pair;
     for note in &pair.notes {
         reporter.handle(&Event::Note(note.clone()))?;
     }

@@ -100,6 +100,18 @@ pub enum Event {
     },
     /// Something that the user should know, in a sentence.
     Note(String),
+    /// Pairs of the two shapes were found before training.
+    Matched {
+        /// How many.
+        pairs: usize,
+        /// Shares of the source and of the target that have one of them near, 0 to 1.
+        coverage: [f64; 2],
+        /// The median and the 95 % quantile of how far points come back from where they began that are
+        /// carried from the source to the target and back, in normalised units.
+        cycle: [f64; 2],
+        /// Wall-clock seconds that it took.
+        seconds: f64,
+    },
     /// The next step is the first of a phase, or of this process.
     PhaseEntered {
         /// The phase.

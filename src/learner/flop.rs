@@ -18,7 +18,9 @@ use isomorph_model::trajectory::Integrator;
 
 use super::batch::BatchSizes;
 use super::event::Phase;
+use super::motion::{has_priors, needs_rate};
 use super::settings::Settings;
+use crate::recipe::GeometryKind;
 
 /// The operations of one step in a phase.
 pub fn per_step(settings: &Settings, sizes: BatchSizes, phase: Phase) -> f64 {
@@ -37,36 +39,34 @@ pub fn per_step(settings: &Settings, sizes: BatchSizes, phase: Phase) -> f64 {
     let matched = 2.0 * sizes.matched as f64;
     let collocation = (sizes.band + sizes.uniform) as f64;
 
+    let flow = settings.geometry == GeometryKind::Flow;
+    let tracked = match (trains_v, flow) {
+        (false, _) => 0.0,
+        (true, true) if loss.on_surface > 0.0 => matched + carried,
+        (true, false) if trains_f => matched + carried,
+        (true, _) => matched,
+    };
     let with_normals = trains_f && loss.transported_normals > 0.0;
-    let constants = match (with_normals, trains_v && trains_f) {
-        (true, _) => 2.0 * carried * evaluations,
+    let constants = match flow {
+        true if trains_v && has_priors(loss) => carried * evaluations,
+        true => 0.0,
+        false if with_normals => 2.0 * carried * evaluations,
         // The tracked trajectories serve as constants as well.
-        (false, true) => 0.0,
-        (false, false) => carried * evaluations,
+        false if trains_v && trains_f => 0.0,
+        false => carried * evaluations,
     };
-    let tracked = if trains_v {
-        matched + if trains_f { carried } else { 0.0 }
-    } else {
-        0.0
-    };
-    let priors = [
-        loss.smoothness,
-        loss.divergence,
-        loss.strain,
-        loss.steadiness,
-    ];
-    let jet = match (trains_v, trains_f && loss.level_set > 0.0) {
-        (true, wanted) if wanted || priors.iter().any(|weight| *weight > 0.0) => {
-            jet_units(settings, true)
-        }
+    let coupled = trains_f && loss.level_set > 0.0 && !flow;
+    let jet = match (trains_v, coupled) {
+        (true, wanted) if wanted || has_priors(loss) => jet_units(settings, true),
         (false, true) => jet_units(settings, false),
         _ => 0.0,
     };
     let of_v = constants + 3.0 * tracked * evaluations + jet * collocation;
-    let of_f = if trains_f {
-        6.0 * sizes.total() as f64
-    } else {
-        0.0
+    let of_f = match (flow, trains_f) {
+        // The value where points arrive, derived by their places alone.
+        (true, _) => 6.0 * settings.training.batch as f64 + 2.0 * (tracked - matched).max(0.0),
+        (false, true) => 6.0 * sizes.total() as f64,
+        (false, false) => 0.0,
     };
     unit_v * of_v + unit_f * of_f
 }
@@ -75,7 +75,7 @@ pub fn per_step(settings: &Settings, sizes: BatchSizes, phase: Phase) -> f64 {
 fn jet_units(settings: &Settings, tracked: bool) -> f64 {
     let loss = &settings.loss;
     let laplacian = tracked && loss.smoothness > 0.0 && loss.smoothness_alpha > 0.0;
-    let rate = tracked && loss.steadiness > 0.0 && settings.velocity.time_dependent;
+    let rate = tracked && needs_rate(loss) && settings.velocity.time_dependent;
     match (settings.derivatives, laplacian) {
         (Derivatives::Forward, _) => {
             let lanes = 4.0 + f64::from(u8::from(laplacian)) + f64::from(u8::from(rate));

@@ -7,7 +7,9 @@
 //! | `schedule.rs` | our method's phases, ramp and learning rates by step |
 //! | `batch.rs` | the samples of a step, on the host, and their equal parts |
 //! | `posed.rs` | the objective of a part, its terms and its gradients |
-//! | `step.rs` | the objective of a step of our method, on the device |
+//! | `motion.rs` | what a step asks of `V`: trajectories, matching, priors |
+//! | `step.rs` | the objective of a step with `f(x, t)` in one network, on the device |
+//! | `flow_step.rs` | the same with two end fields that the flow carries |
 //! | `optimiser.rs` | Adam with a limited gradient |
 //! | `checkpoint.rs` | whole checkpoints or none |
 //! | `event.rs` | what the loop reports |
@@ -20,8 +22,10 @@ pub mod batch;
 pub mod checkpoint;
 pub mod event;
 pub mod flop;
+pub mod flow_step;
 pub mod memory;
 pub mod method;
+pub mod motion;
 mod optimiser;
 pub mod posed;
 pub mod schedule;

@@ -89,16 +89,17 @@ mod tests {
     use super::*;
     use crate::recipe::{Preset, Recipe};
 
-    fn schedule(preset: Preset) -> Schedule {
+    fn schedule(preset: Preset, changes: &[&str]) -> Schedule {
         let text =
             format!("preset = \"{preset}\"\n[data]\nsource = \"a.ply\"\ntarget = \"b.ply\"\n");
-        let recipe = Recipe::parse(&text, std::path::Path::new("recipe.toml"), &[]);
+        let changes: Vec<String> = changes.iter().map(|change| (*change).to_owned()).collect();
+        let recipe = Recipe::parse(&text, std::path::Path::new("recipe.toml"), &changes);
         Schedule::new(&recipe.expect("a small valid recipe").training)
     }
 
     #[test]
     fn the_paper_preset_has_the_printed_schedule() {
-        let paper = schedule(Preset::Paper);
+        let paper = schedule(Preset::Paper, &[]);
         assert_eq!(paper.phase(1999), Phase::WarmUp);
         assert_eq!(paper.phase(2000), Phase::Ramp);
         assert_eq!(paper.phase(5000), Phase::Joint);
@@ -114,7 +115,10 @@ mod tests {
 
     #[test]
     fn a_cosine_falls_over_the_span_in_which_its_network_trains() {
-        let quick = schedule(Preset::Quick);
+        let quick = schedule(
+            Preset::Quick,
+            &["training.learning-rate=2e-3", "training.velocity-until=0.7"],
+        );
         let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a}, wanted {b}");
         close(quick.velocity_rate(0), 2e-3);
         close(quick.velocity_rate(350), 2e-3 * 0.51);

@@ -1,17 +1,20 @@
 //! From the recipe's words to the model's types: what the learner is told, in one place.
 
 use isomorph_model::activation::Activation;
+use isomorph_model::baseline::ends::EndWeights;
 use isomorph_model::operators::Derivatives;
 use isomorph_model::trajectory::{Integrator, Steps};
 use isomorph_model::{ImplicitNetConfig, VelocityNetConfig};
 
-use crate::recipe::{self, LossRecipe, Recipe, TrainingRecipe};
-use crate::shape;
+use crate::recipe::{self, GeometryKind, LossRecipe, Recipe, TrainingRecipe};
+use crate::shape::{self, Correspondences};
 
 /// Everything that shapes a step, in the model's types.
 #[derive(Clone, Debug)]
 pub struct Settings {
-    /// The Implicit-Net.
+    /// Where f comes from.
+    pub geometry: GeometryKind,
+    /// The Implicit-Net, or each of the two end fields.
     pub implicit: ImplicitNetConfig,
     /// The Velocity-Net.
     pub velocity: VelocityNetConfig,
@@ -32,6 +35,7 @@ impl Settings {
     pub fn new(recipe: &Recipe) -> Self {
         let training = recipe.training.clone();
         Self {
+            geometry: recipe.implicit.geometry,
             implicit: implicit(recipe),
             velocity: velocity(recipe),
             loss: recipe.loss.clone(),
@@ -50,6 +54,17 @@ impl Settings {
             },
             training,
         }
+    }
+}
+
+/// The weights of the terms at the ends.
+pub fn end_weights(loss: &LossRecipe) -> EndWeights {
+    EndWeights {
+        // As where f is one network: the paper adds the means over the two shapes, and this is their mean.
+        data: 2.0 * loss.data,
+        normals: loss.normals,
+        eikonal: loss.eikonal,
+        off_surface: loss.off_surface,
     }
 }
 
@@ -86,8 +101,9 @@ fn activation(kind: recipe::Activation, beta: f64) -> Activation {
     }
 }
 
-/// What the recipe says of the shapes.
-pub fn data(recipe: &Recipe) -> shape::DataOptions {
+/// What the recipe says of the shapes; `found` are the pairs where it has them found
+/// ([`recipe::Correspondences::Match`]), and of no account where it names others.
+pub fn data(recipe: &Recipe, found: Option<Correspondences>) -> shape::DataOptions {
     let section = &recipe.data;
     shape::DataOptions {
         source: section.source.clone(),
@@ -95,6 +111,10 @@ pub fn data(recipe: &Recipe) -> shape::DataOptions {
         correspondences: match &section.correspondences {
             recipe::Correspondences::None => shape::CorrespondenceSource::None,
             recipe::Correspondences::SameVertices => shape::CorrespondenceSource::SameVertices,
+            recipe::Correspondences::Match => found.map_or(
+                shape::CorrespondenceSource::None,
+                shape::CorrespondenceSource::Pairs,
+            ),
             recipe::Correspondences::File(path) => shape::CorrespondenceSource::File(path.clone()),
         },
         points: section.points,

@@ -16,6 +16,12 @@ fn recipe(extra: &[&str]) -> Recipe {
     let text = "preset = \"quick\"\n[data]\nsource = \"a.ply\"\ntarget = \"b.ply\"\n";
     let small = [
         "data.correspondences=same-vertices",
+        "implicit.geometry=network",
+        "implicit.activation=softplus",
+        "implicit.beta=100",
+        "training.velocity-until=0.7",
+        "training.integrator=midpoint",
+        "training.time-steps=3",
         "implicit.depth=2",
         "implicit.width=8",
         "velocity.depth=2",
@@ -94,12 +100,15 @@ fn a_batch_has_the_sizes_and_ranges_that_it_says() {
 fn the_parts_of_a_step_add_up_to_the_whole() {
     // As drawn for 88 points and 8 correspondences, all numbers are even.
     let of = 2;
-    for name in ["velocity-field", "mlp", "sdf-blend", "lipmlp", "nise"] {
-        let learner = learner(&[
-            &format!("method.name={name}"),
-            "training.warm-up=0",
-            "training.ramp-until=0",
-        ]);
+    for name in [
+        "method.name=velocity-field",
+        FLOW,
+        "method.name=mlp",
+        "method.name=sdf-blend",
+        "method.name=lipmlp",
+        "method.name=nise",
+    ] {
+        let learner = learner(&[name, "training.warm-up=0", "training.ramp-until=0"]);
         let solve = |part: Part| {
             learner
                 .method
@@ -297,10 +306,58 @@ fn the_phases_train_the_networks_that_they_name() {
     }
 }
 
-/// Every method by name.
+#[test]
+fn the_end_fields_of_a_flow_train_in_every_step_and_its_velocity_as_the_schedule_says() {
+    let digest = |learner: &Learner<B>| {
+        let files = learner.method().records().expect("encodes").0;
+        let named = |name: &str| files.iter().find(|(file, _)| file == name).cloned();
+        let [ends, velocity] = ["ends.mpk", "velocity.mpk"].map(named);
+        (ends.expect("g and h"), velocity.expect("V"))
+    };
+    let mut learner = learner(&[FLOW]);
+    for step in 0..10 {
+        let (ends, v) = digest(&learner);
+        learner.advance(false);
+        let (next_ends, next_v) = digest(&learner);
+        assert_ne!(ends, next_ends, "the end fields in step {step}");
+        assert_eq!(v != next_v, step < 7, "V in step {step}");
+    }
+}
+
+#[test]
+fn the_surface_term_of_a_flow_moves_its_velocity_and_leaves_the_end_fields_alone() {
+    let gradients = |on_surface: &str| {
+        let learner = learner(&[
+            FLOW,
+            "training.ramp-until=0",
+            "training.warm-up=0",
+            on_surface,
+        ]);
+        let posed = learner.method.objective(&learner.data, 5, Part::WHOLE);
+        let (terms, gradients) = posed.solve(1, true);
+        let has = terms.iter().any(|term| term.name == "on-surface");
+        let first = |network: usize| {
+            let of = gradients[network].get::<NdArray, 2>(ParamId::from(1));
+            let data = of.expect("of the first layer").into_data();
+            data.to_vec::<f32>().expect("f32")
+        };
+        (has, first(0), first(1))
+    };
+    let (with, ends, v) = gradients("loss.on-surface=100");
+    let (without, bare_ends, bare_v) = gradients("loss.on-surface=0");
+    assert!(with && !without);
+    assert_eq!(ends, bare_ends, "the end fields are constants of it");
+    assert_ne!(v, bare_v);
+}
+
+/// Our method with the other geometry.
+const FLOW: &str = "implicit.geometry=flow";
+
+/// Every method by name, ours with both geometries.
 fn methods() -> impl Iterator<Item = String> {
     let names = crate::recipe::MethodName::WORDS.iter();
-    names.map(|name| format!("method.name={name}"))
+    let named = names.map(|name| format!("method.name={name}"));
+    named.chain([FLOW.to_owned()])
 }
 
 /// Small settings of what only some methods have.

@@ -14,8 +14,8 @@ use std::path::PathBuf;
 use super::rule::{Rule, Value};
 use super::schema::{Key, Section, Setting, sections};
 use super::words::{
-    Activation, Correspondences, Derivatives, Integrator, LevelSetForm, MethodName, NormalSource,
-    Preset, Schedule, TimeSampling,
+    Activation, Correspondences, Derivatives, GeometryKind, Integrator, LevelSetForm, MethodName,
+    NormalSource, Preset, Schedule, TimeSampling,
 };
 
 /// The most steps, points or files of any kind that a recipe may ask for.
@@ -41,8 +41,8 @@ sections! {
         source: PathBuf = _ | _ | _, Rule::path();
         /// The shape at time 1.
         target: PathBuf = _ | _ | _, Rule::path();
-        /// Known pairs: none, every vertex with the one of the same number, or those of a CSV file
-        /// with source_index,target_index on each line.
+        /// Known pairs: none, every vertex with the one of the same number, pairs found by "match"
+        /// before training, or those of a CSV file with source_index,target_index on each line.
         correspondences: Correspondences = "none" | "none" | "none",
             Rule::word_or_path(Correspondences::WORDS);
         /// Points sampled from each mesh; the paper takes 20000.
@@ -91,16 +91,20 @@ sections! {
 
     /// The network f(x, t), whose zero set at time t is the surface.
     implicit: ImplicitRecipe {
+        /// Where f(x, t) comes from: one "network", the paper's; or the "flow", which carries two
+        /// end fields, each of the shape below, so that the level-set equation holds by itself.
+        /// The terms level-set, transported-normals and their kind are of the network alone.
+        geometry: GeometryKind = "flow" | "flow" | "network", Rule::word(GeometryKind::WORDS);
         /// Hidden layers.
         depth: usize = 5 | 5 | 8, Rule::whole(1, 32);
         /// Units in each hidden layer.
         width: usize = 128 | 128 | 512, Rule::whole(4, 4096);
         /// Nonlinearity; the paper's is the softplus.
-        activation: Activation = "softplus" | "softplus" | "softplus",
+        activation: Activation = "sine" | "sine" | "softplus",
             Rule::word(Activation::WORDS);
-        /// Sharpness of the softplus, which the paper leaves open; with "sine" the frequency
-        /// omega_0, for which 20 is a good start.
-        beta: f64 = 100 | 100 | 100, Rule::above_zero(1000.0);
+        /// With "sine" the frequency omega_0; with "softplus" its sharpness, which the paper leaves
+        /// open and for which 100 is a good start.
+        beta: f64 = 20 | 20 | 100, Rule::above_zero(1000.0);
         /// Frequencies of the positional encoding; the paper encodes, and leaves their number
         /// open.
         frequencies: usize = 0 | 0 | 6, Rule::whole(0, 16).zero("feeds x as it is");
@@ -128,9 +132,9 @@ sections! {
         frequencies: usize = 0 | 0 | 6, Rule::whole(0, 16).zero("feeds x as it is");
         /// Hidden layer that is given the input again; must be less than depth.
         skip: usize = 0 | 0 | 0, Rule::whole(0, 31).zero("gives it to none");
-        /// Whether V depends on the time as well; the paper writes V(x); without time, rotations
-        /// are exact and the motion in between is steadier.
-        time_dependent: bool = false | false | false, Rule::flag();
+        /// Whether V depends on the time as well; the paper writes V(x). With time, limbs may pass
+        /// one place in different directions; it needs a price, such as loss.screw.
+        time_dependent: bool = true | true | false, Rule::flag();
     }
 
     /// The weights of the objective's terms and what shapes them.
@@ -156,8 +160,18 @@ sections! {
         /// leaves the second open).
         divergence: f64 = 2 | 2 | 20, Rule::positive_or_zero().zero("turns volume preservation off");
         /// Weight of the strain rate |(J + J^T)/2|^2 near the surface, which leaves rotations
-        /// free; not in the paper; only for a V without time.
+        /// free; not in the paper; with a V of time it wants loss.screw beside it.
         strain: f64 = 3 | 3 | 0, Rule::positive_or_zero().zero("suits shapes that stretch");
+        /// Strain rate beyond which the strain term grows linearly and not with the square, so that
+        /// strain gathers in joints; 0.1 is a good start.
+        strain_scale: f64 = 0 | 0 | 0,
+            Rule::positive_or_zero().unit("per unit of time").zero("is the square everywhere");
+        /// Weight of the strain rate without its change of size, near the surface; not in the
+        /// paper; for shapes whose parts grow.
+        deviatoric: f64 = 0 | 0 | 0, Rule::positive_or_zero().zero("turns it off");
+        /// Weight of the strain rate within the surface, which needs normals; not in the paper;
+        /// lets the space beside the surface shear.
+        stretch: f64 = 0 | 0 | 0, Rule::positive_or_zero().zero("turns it off");
         /// Weight of the distance between carried points and their correspondences (the paper's
         /// lambda_m).
         matching: f64 = 200 | 200 | 200,
@@ -177,8 +191,8 @@ sections! {
         /// Weight of (|grad f| - 1)^2 at all times; not in the paper's total, but without it f
         /// collapses to zero.
         eikonal: f64 = 10 | 10 | 10, Rule::positive_or_zero().zero("lets f collapse");
-        /// Weight of |f| at surface points carried to random times; not in the paper; teaches V
-        /// as well.
+        /// Weight of |f| at surface points carried to random times (of the flow: to the other shape);
+        /// not in the paper; teaches V as well.
         on_surface: f64 = 100 | 100 | 0, Rule::positive_or_zero().zero("turns it off");
         /// Weight of the angle between grad f and the normals carried by V; not in the paper; the
         /// decisive term for the surfaces in between.
@@ -189,6 +203,12 @@ sections! {
         /// Weight of |dV/dt|^2, which steadies a time-dependent V; not in the paper; 1 to 10 is a
         /// good start.
         steadiness: f64 = 0 | 0 | 0, Rule::positive_or_zero().zero("turns it off");
+        /// Weight of |dV/dt + D V|^2 near the surface, D the strain rate, which lets each part keep to
+        /// a screw motion of its own; not in the paper; the fair price on a time-dependent V.
+        screw: f64 = 30 | 30 | 0, Rule::positive_or_zero().zero("turns it off");
+        /// Weight of |dV/dt + J V|^2 near the surface: straight paths at constant speed; not in the
+        /// paper.
+        acceleration: f64 = 0 | 0 | 0, Rule::positive_or_zero().zero("turns it off");
     }
 
     /// The steps of the optimiser and what each one samples.
@@ -200,8 +220,8 @@ sections! {
         /// Correspondences carried in each step, all of them where fewer are known; the paper
         /// leaves it open.
         correspondence_batch: usize = 250 | 500 | 1_000, Rule::whole(1, 1_000_000);
-        /// Learning rate of f; the paper's is 0.005.
-        learning_rate: f64 = 2e-3 | 1e-3 | 5e-3, Rule::above_zero(1.0);
+        /// Learning rate of f; the paper's is 0.005. Softplus networks take 1e-3 to 2e-3.
+        learning_rate: f64 = 5e-4 | 5e-4 | 5e-3, Rule::above_zero(1.0);
         /// Learning rate of V; the paper has one for both.
         velocity_learning_rate: f64 = 2e-3 | 1e-3 | 5e-3, Rule::above_zero(1.0);
         /// How the learning rates fall: "cosine" over the steps in which a network trains, or
@@ -220,12 +240,12 @@ sections! {
         /// Until here the weight of the level-set equation rises from 0.
         ramp_until: f64 = 0.4 | 0.4 | 0.5, Rule::number(0.0, 1.0).unit("share of the steps");
         /// From here only f trains.
-        velocity_until: f64 = 0.7 | 0.7 | 0.8, Rule::number(0.0, 1.0).unit("share of the steps");
-        /// Method that integrates trajectories; the paper's is Euler's, and the midpoint with 3
-        /// steps is as exact as Euler's with 10.
-        integrator: Integrator = "midpoint" | "midpoint" | "euler", Rule::word(Integrator::WORDS);
+        velocity_until: f64 = 1 | 1 | 0.8, Rule::number(0.0, 1.0).unit("share of the steps");
+        /// Method that integrates trajectories; the paper's is Euler's. What it leaves out shows at
+        /// the far end: over a turn of a radian, "midpoint" with 3 steps misses by 0.005.
+        integrator: Integrator = "rk4" | "rk4" | "euler", Rule::word(Integrator::WORDS);
         /// Steps of the integrator from time 0 to 1, which the paper leaves open.
-        time_steps: usize = 3 | 3 | 10, Rule::whole(1, 1000);
+        time_steps: usize = 2 | 2 | 10, Rule::whole(1, 1000);
         /// Times at which the terms in between are sampled: "random", or the "grid" of the
         /// integrator's steps; the paper leaves it open.
         times: TimeSampling = "random" | "random" | "random", Rule::word(TimeSampling::WORDS);

@@ -36,8 +36,8 @@ pub use keys::{
     TrainingRecipe, VelocityRecipe,
 };
 pub use words::{
-    Activation, Correspondences, Derivatives, Integrator, LevelSetForm, MethodName, NormalSource,
-    Preset, Schedule, TimeSampling,
+    Activation, Correspondences, Derivatives, GeometryKind, Integrator, LevelSetForm, MethodName,
+    NormalSource, Preset, Schedule, TimeSampling,
 };
 
 use keys::KEYS;

@@ -104,6 +104,13 @@ words! {
         Sine = "sine",
     }
 
+    /// Where `f(x, t)` comes from.
+    GeometryKind {
+        /// One network of position and time.
+        Network = "network",
+        /// Two end fields, carried by the flow of `V`.
+        Flow = "flow",
+    }
     /// The form of the level-set equation.
     LevelSetForm {
         /// Modified: `f_t + V.grad f + lambda_l f R = 0`, `R = -<J n, n>`.
@@ -154,12 +161,14 @@ pub enum Correspondences {
     None,
     /// Vertex i of the source is vertex i of the target.
     SameVertices,
+    /// Pairs that are found before training, from the shapes alone.
+    Match,
     /// The pairs `source_index,target_index` of a CSV file.
     File(PathBuf),
 }
 
 impl Correspondences {
-    pub(super) const WORDS: &'static [&'static str] = &["none", "same-vertices"];
+    pub(super) const WORDS: &'static [&'static str] = &["none", "same-vertices", "match"];
 }
 
 impl Setting for Correspondences {
@@ -168,6 +177,7 @@ impl Setting for Correspondences {
             Value::Text(text) => Some(match text.as_str() {
                 "none" => Correspondences::None,
                 "same-vertices" => Correspondences::SameVertices,
+                "match" => Correspondences::Match,
                 _ => Correspondences::File(text.into()),
             }),
             _ => None,
@@ -178,6 +188,7 @@ impl Setting for Correspondences {
         Value::Text(match self {
             Correspondences::None => "none".to_owned(),
             Correspondences::SameVertices => "same-vertices".to_owned(),
+            Correspondences::Match => "match".to_owned(),
             // A name without folder or extension would read as a misspelt word.
             Correspondences::File(path) => match path.to_string_lossy() {
                 text if looks_like_path(&text) => text.into_owned(),

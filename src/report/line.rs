@@ -24,6 +24,7 @@ pub(super) fn line(event: &Event, run: &Path, left: Option<Duration>) -> Option<
         Event::Tick { .. } => return None,
         Event::Started { .. } => return started(event),
         Event::Note(text) => format!("note: {}", text.replace('\n', " ")),
+        Event::Matched { .. } => return matched(event),
         Event::PhaseEntered { phase, step } => format!("{phase} from step {} on", step + 1),
         Event::Step(report) => step(report, left),
         Event::Checkpoint { step, path } => {
@@ -109,6 +110,27 @@ fn started(event: &Event) -> Option<String> {
         counted(*source_points, "point"),
         HumanCount(*target_points as u64),
         counted(*correspondences, "correspondence"),
+    ))
+}
+
+/// What matching has found; `None` for any other event.
+fn matched(event: &Event) -> Option<String> {
+    let Event::Matched {
+        pairs,
+        coverage: [source, target],
+        cycle: [median, most],
+        seconds,
+    } = event
+    else {
+        return None;
+    };
+    Some(format!(
+        "matched {} in {}: near {:.0} % of the source and {:.0} % of the target; there and back within \
+         {median:.4} (median) and {most:.4} (95 %) of normalised length",
+        counted(*pairs, "pair"),
+        duration(*seconds),
+        100.0 * source,
+        100.0 * target,
     ))
 }
 

@@ -103,6 +103,17 @@ fn an_extraction_says_what_is_wrong_with_the_surface() {
 fn the_other_events_read_like_this() {
     assert_eq!(line(&Event::Tick { step: 3 }, Path::new(""), None), None);
     assert_eq!(text(Event::Note("two\nlines".into())), "note: two lines");
+    let matched = Event::Matched {
+        pairs: 3812,
+        coverage: [0.974, 1.0],
+        cycle: [0.00171, 0.0123],
+        seconds: 18.4,
+    };
+    assert_eq!(
+        text(matched),
+        "matched 3,812 pairs in 18s: near 97 % of the source and 100 % of the target; there and back \
+         within 0.0017 (median) and 0.0123 (95 %) of normalised length"
+    );
     let entered = Event::PhaseEntered {
         phase: Phase::WarmUp,
         step: 0,

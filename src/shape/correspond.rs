@@ -2,7 +2,8 @@
 //! order.
 //!
 //! The file has `source_index,target_index` on each line, vertices counted from 0 in the order of
-//! their files. Spaces around the numbers, empty lines, lines that start with `#` and one line of
+//! their files. A third number from 0 to 1, the confidence that `isomorph match` writes, may follow;
+//! here all pairs count alike. Spaces around the numbers, empty lines, lines that start with `#` and one line of
 //! column names before the first pair are passed over. A vertex may occur more than once.
 
 use std::path::Path;
@@ -19,7 +20,7 @@ pub struct Correspondences {
 }
 
 impl Correspondences {
-    /// Reads pairs of vertices of `source` and `target` from a two-column CSV file.
+    /// Reads pairs of vertices of `source` and `target` from a CSV file of two columns, or three.
     ///
     /// # Errors
     /// The file and the line, where a line is not two whole numbers or a vertex does not exist;
@@ -44,7 +45,8 @@ impl Correspondences {
             }
             let pair = parse_pair(line).ok_or_else(|| {
                 let shown: String = line.chars().take(60).collect();
-                let allowed = "must be source_index,target_index, two whole numbers from 0";
+                let allowed = "must be source_index,target_index, two whole numbers from 0 (and a \
+                               confidence from 0 to 1, if any)";
                 ShapeError::line(path, at + 1, format!("{shown:?}: {allowed}"))
             })?;
             for (index, shape) in pair.into_iter().zip([source, target]) {
@@ -100,10 +102,15 @@ impl Correspondences {
     }
 }
 
-/// Two whole numbers separated by a comma.
+/// Two whole numbers separated by a comma, and perhaps a share of 1 after another.
 fn parse_pair(line: &str) -> Option<[u64; 2]> {
-    let (source, target) = line.split_once(',')?;
-    Some([source.trim().parse().ok()?, target.trim().parse().ok()?])
+    let mut fields = line.split(',').map(str::trim);
+    let pair = [fields.next()?.parse().ok()?, fields.next()?.parse().ok()?];
+    if let Some(confidence) = fields.next() {
+        let confidence: f64 = confidence.parse().ok()?;
+        (0.0..=1.0).contains(&confidence).then_some(())?;
+    }
+    fields.next().is_none().then_some(pair)
 }
 
 #[cfg(test)]
@@ -148,9 +155,22 @@ mod tests {
     }
 
     #[test]
+    fn a_confidence_may_follow_and_is_checked() {
+        let text = "source_index,target_index,confidence\n0,199,0.75\n1,2,1\n3,4\n5,6,0\n";
+        assert_eq!(
+            read(text).expect("read").pairs,
+            [[0, 199], [1, 2], [3, 4], [5, 6]]
+        );
+    }
+
+    #[test]
     fn a_line_that_is_no_pair_is_named() {
         for bad in [
             "1",
+            "1,2,-0.1",
+            "1,2,nan",
+            "1,2,0.5,0.5",
+            "1,2,",
             "1;2",
             "1,2,3",
             "1,-2",

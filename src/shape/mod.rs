@@ -41,6 +41,7 @@ pub use error::ShapeError;
 pub use neighbours::{Neighbour, NeighbourSearch};
 pub use normalise::{Bounds, Normalisation, cloud_area};
 pub use normals::estimate_normals;
+pub(crate) use pair::points_of;
 pub use pair::{Cloud, CorrespondenceSource, DataOptions, NormalSource, Pair, prepare};
 pub use sample::{SurfaceSamples, sample_surface};
 

@@ -28,16 +28,16 @@ pub struct Neighbour {
 
 /// Points arranged for nearest-neighbour queries.
 #[derive(Debug)]
-pub struct NeighbourSearch {
-    tree: ImmutableKdTree<f64, u32, 3, BUCKET>,
+pub struct NeighbourSearch<const DIMENSIONS: usize = 3> {
+    tree: ImmutableKdTree<f64, u32, DIMENSIONS, BUCKET>,
 }
 
-impl NeighbourSearch {
+impl<const DIMENSIONS: usize> NeighbourSearch<DIMENSIONS> {
     /// Arranges the points; O(n log n).
     ///
     /// # Panics
     /// If there are no points, or 2^32 or more.
-    pub fn new(points: &[[f64; 3]]) -> Self {
+    pub fn new(points: &[[f64; DIMENSIONS]]) -> Self {
         assert!(!points.is_empty(), "neighbours of no points");
         assert!(
             u32::try_from(points.len()).is_ok(),
@@ -50,7 +50,7 @@ impl NeighbourSearch {
     }
 
     /// The nearest point to `query`.
-    pub fn nearest_one(&self, query: [f64; 3]) -> Neighbour {
+    pub fn nearest_one(&self, query: [f64; DIMENSIONS]) -> Neighbour {
         let found = self.tree.nearest_one::<SquaredEuclidean>(&query);
         Neighbour {
             index: found.item,
@@ -60,7 +60,7 @@ impl NeighbourSearch {
 
     /// The `count` points nearest to `query`, nearest first; all of them if there are fewer. A
     /// query that is itself one of the points finds itself first, at distance 0.
-    pub fn nearest(&self, query: [f64; 3], count: NonZeroUsize) -> Vec<Neighbour> {
+    pub fn nearest(&self, query: [f64; DIMENSIONS], count: NonZeroUsize) -> Vec<Neighbour> {
         let found = self.tree.nearest_n::<SquaredEuclidean>(&query, count);
         let neighbour = |found: &kiddo::NearestNeighbour<f64, u32>| Neighbour {
             index: found.item,
@@ -72,7 +72,7 @@ impl NeighbourSearch {
     /// [`Self::nearest`] of each query, on all cores; the order of the queries is kept.
     pub fn nearest_of_each(
         &self,
-        queries: &[[f64; 3]],
+        queries: &[[f64; DIMENSIONS]],
         count: NonZeroUsize,
     ) -> Vec<Vec<Neighbour>> {
         queries
@@ -82,7 +82,7 @@ impl NeighbourSearch {
     }
 
     /// [`Self::nearest_one`] of each query, on all cores; the order of the queries is kept.
-    pub fn nearest_one_of_each(&self, queries: &[[f64; 3]]) -> Vec<Neighbour> {
+    pub fn nearest_one_of_each(&self, queries: &[[f64; DIMENSIONS]]) -> Vec<Neighbour> {
         queries
             .par_iter()
             .with_min_len(QUERIES_AT_LEAST)

@@ -23,6 +23,8 @@ pub enum CorrespondenceSource {
     File(PathBuf),
     /// Vertex i of the source corresponds to vertex i of the target.
     SameVertices,
+    /// These.
+    Pairs(Correspondences),
     /// None are known.
     None,
 }
@@ -163,13 +165,15 @@ pub fn prepare(options: &DataOptions) -> Result<Pair, ShapeError> {
     let mut notes = Vec::new();
     let mut cloud = |shape: &Shape, draw: Draw| {
         let mut rng = draw.generator(options.seed);
-        points_of(shape, options, &mut rng, &mut notes).map(|(points, normals)| Cloud {
-            points: points
-                .into_iter()
-                .map(|point| normalisation.apply(point))
-                .collect(),
-            normals,
-        })
+        points_of(shape, options.points, options.normals, &mut rng, &mut notes).map(
+            |(points, normals)| Cloud {
+                points: points
+                    .into_iter()
+                    .map(|point| normalisation.apply(point))
+                    .collect(),
+                normals,
+            },
+        )
     };
     let source = cloud(&source, Draw::Source)?;
     let target = cloud(&target, Draw::Target)?;
@@ -187,35 +191,36 @@ pub fn prepare(options: &DataOptions) -> Result<Pair, ShapeError> {
 /// Points in the user's coordinates, and their normals unless none are wanted.
 type Points = (Vec<[f64; 3]>, Option<Vec<[f32; 3]>>);
 
-/// The points of a shape: samples of a mesh, the vertices of a cloud.
-fn points_of(
+/// The points of a shape: so many samples of a mesh, the vertices of a cloud.
+pub(crate) fn points_of(
     shape: &Shape,
-    options: &DataOptions,
+    count: usize,
+    wanted: NormalSource,
     rng: &mut ChaCha8Rng,
     notes: &mut Vec<String>,
 ) -> Result<Points, ShapeError> {
     let name = shape.path.display();
     let (points, given) = if shape.is_mesh() {
-        let samples = sample_surface(&shape.vertices, &shape.triangles, options.points, rng);
-        let normals = match options.normals {
+        let samples = sample_surface(&shape.vertices, &shape.triangles, count, rng);
+        let normals = match wanted {
             NormalSource::Auto => outward(shape, samples.normals, notes),
             _ => Some(samples.normals),
         };
         (samples.points, normals)
     } else {
         let normals = usable_normals(shape);
-        if let (NormalSource::Given, Err(problem)) = (options.normals, &normals) {
+        if let (NormalSource::Given, Err(problem)) = (wanted, &normals) {
             return Err(ShapeError::Normals {
                 path: shape.path.clone(),
                 problem: problem.clone(),
             });
         }
-        if let (NormalSource::Auto, Err(problem)) = (options.normals, &normals) {
+        if let (NormalSource::Auto, Err(problem)) = (wanted, &normals) {
             notes.push(format!("{name}: {problem}: estimated from its points"));
         }
         (shape.vertices.clone(), normals.ok())
     };
-    let normals = match options.normals {
+    let normals = match wanted {
         NormalSource::None => None,
         NormalSource::Estimate => Some(estimate_normals(&points)),
         NormalSource::Auto | NormalSource::Given => {
@@ -286,6 +291,7 @@ fn correspondences(
         CorrespondenceSource::None => return Ok(Vec::new()),
         CorrespondenceSource::File(path) => Correspondences::read_csv(path, source, target)?,
         CorrespondenceSource::SameVertices => Correspondences::same_vertices(source, target)?,
+        CorrespondenceSource::Pairs(known) => known.clone(),
     };
     let points = if source.is_mesh() {
         options.points

@@ -130,6 +130,10 @@ fn every_command_has_help_that_names_its_defaults() {
                 "[default: as in",
             ],
         ),
+        (
+            "match",
+            &["--aligned", "[default: pairs.csv]", "[default: 0.5]"],
+        ),
         ("init", &["[default: none]", "[default: default]"]),
         ("info", &["recipe", "run"]),
         ("bench", &["--json"]),

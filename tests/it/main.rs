@@ -12,6 +12,7 @@ mod evaluation;
 mod extraction;
 mod golden;
 mod information;
+mod matching;
 mod methods;
 mod outputs;
 mod resume;

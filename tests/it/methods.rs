@@ -12,9 +12,14 @@ use crate::support::ply::{self, Ply};
 use crate::support::run::{Run, json};
 use crate::support::workplace::{Workplace, names, turn};
 
-/// Every `method.name`, and what it has: a field whose zero set is its surface, a motion of points.
-const METHODS: [(&str, bool, bool); 8] = [
+/// Our method with `implicit.geometry = "flow"`.
+const FLOW: &str = "flow";
+
+/// Every `method.name` and our own with the other geometry, and what it has: a field whose zero set is its
+/// surface, a motion of points.
+const METHODS: [(&str, bool, bool); 9] = [
     ("velocity-field", true, true),
+    (FLOW, true, true),
     ("mlp", true, false),
     ("sdf-blend", true, false),
     ("lipmlp", true, false),
@@ -35,7 +40,10 @@ const KEYS: &[&str] = &[
 ];
 
 fn method(name: &str) -> String {
-    format!("method.name={name}")
+    match name {
+        FLOW => "implicit.geometry=flow".to_owned(),
+        name => format!("method.name={name}"),
+    }
 }
 
 /// Trains a method on one thread.
@@ -303,6 +311,7 @@ fn fields_that_are_fitted_to_points_learn_without_normals_and_correspondences() 
     let place = Workplace::tiny(KEYS);
     for name in [
         "velocity-field",
+        FLOW,
         "mlp",
         "sdf-blend",
         "nise",

@@ -53,6 +53,16 @@ impl<B: ModelBackend> SdfBlend<B> {
         }
     }
 
+    /// `g`, the field of the source.
+    pub fn source(&self) -> &ImplicitNet<B> {
+        &self.source
+    }
+
+    /// `h`, the field of the target.
+    pub fn target(&self) -> &ImplicitNet<B> {
+        &self.target
+    }
+
     /// `g` and `h` with their derivatives at `[n, 3]`; their rates mean nothing.
     pub fn end_jets(&self, x: Tensor<B, 2>, operators: &impl Operators) -> [ImplicitJet<B>; 2] {
         let t = Tensor::zeros([x.dims()[0], 1], &x.device());

@@ -60,8 +60,16 @@ fn the_terms_on_hand_worked_points() {
     assert_near(scalar(matching::matching(a, b, 2.5)), 2.5 * 4.0 / 5.0);
     let v = expansion(&[[1.0, 0.0, 0.0], [0.0, 2.0, 0.0]]);
     assert_near(scalar(divergence::divergence(&v)), 3.0);
-    assert_near(scalar(strain::strain(&v)), 3.0);
+    assert_near(scalar(strain::strain(&v, 0.0)), 3.0);
+    assert_near(scalar(strain::strain(&v, 1.0)), 2.0);
+    assert_near(scalar(deviatoric::deviatoric(&v)), 0.0);
     assert_near(scalar(steadiness::steadiness(&v)), 4.0);
+    // V_t + J V = (0, 0, 2) + x.
+    assert_near(scalar(acceleration::acceleration(&v)), (5.0 + 8.0) / 2.0);
+    // V_t + D V is the same where J = I.
+    assert_near(scalar(screw::screw(&v)), (5.0 + 8.0) / 2.0);
+    let upwards = points(&[[0.0, 0.0, 1.0]; 2]);
+    assert_near(scalar(stretch::stretch(&v, upwards)), 2.0);
     // V - 0.5 * (0, 3, 0): (1, -1.5, 0) and (0, 0.5, 0).
     assert_near(
         scalar(smoothness::smoothness(&v, 0.5, 1.0)),
@@ -71,6 +79,56 @@ fn the_terms_on_hand_worked_points() {
         scalar(off_surface::off_surface(column(&[0.0, -0.01]))),
         (1.0 + (-1.0f64).exp()) / 2.0,
     );
+}
+
+/// `V = (a y, 0, 0) + b (-y, x, 0)`: a shear along x and a turn about z.
+fn shear_and_turn(a: f64, b: f64) -> VelocityJet<Plain> {
+    let jacobian = [[0.0, a - b, 0.0], [b, 0.0, 0.0], [0.0; 3]];
+    VelocityJet {
+        value: points(&[[0.0; 3]]),
+        jacobian: points::<Plain>(&jacobian).reshape([1, 3, 3]),
+        laplacian: None,
+        rate: None,
+    }
+}
+
+#[test]
+fn the_priors_of_a_shear_are_those_of_its_closed_form_and_a_turn_adds_nothing() {
+    for turn in [0.0, 3.0] {
+        let v = shear_and_turn(2.0, turn);
+        // D has the entries 1 at (x, y) and (y, x).
+        assert_near(scalar(strain::strain(&v, 0.0)), 2.0);
+        assert_near(scalar(strain::strain(&v, 0.5)), 0.5 * (9f64.sqrt() - 1.0));
+        assert_near(scalar(deviatoric::deviatoric(&v)), 2.0);
+        let seen = |n: [f64; 3]| scalar(stretch::stretch(&v, points(&[n])));
+        // In the plane of the shear all of it shows; across it, where x and y do not both lie in the
+        // surface, none; along the diagonal, the stretch of the other diagonal by 1.
+        assert_near(seen([0.0, 0.0, 1.0]), 2.0);
+        assert_near(seen([1.0, 0.0, 0.0]), 0.0);
+        let half = 0.5f64.sqrt();
+        assert_near(seen([half, half, 0.0]), 1.0);
+    }
+}
+
+#[test]
+fn a_screw_costs_nothing_wherever_its_axis_is_and_a_change_of_its_pace_does() {
+    // V = omega (e_3 x (x - c)) + s e_3 at a pace of 1 + a t, seen at t = 0.
+    let (omega, slide, pace) = (1.5, 0.4, 0.6);
+    let (x, c) = ([0.7, -0.2, 0.3], [0.1, 0.5, -0.2]);
+    let value = [-omega * (x[1] - c[1]), omega * (x[0] - c[0]), slide];
+    let jacobian = [[0.0, -omega, 0.0], [omega, 0.0, 0.0], [0.0; 3]];
+    let jet = |pace: f64| VelocityJet::<Plain> {
+        value: points(&[value]),
+        jacobian: points::<Plain>(&jacobian).reshape([1, 3, 3]),
+        laplacian: None,
+        rate: Some(points(&[value.map(|v| v * pace)])),
+    };
+    assert_near(scalar(screw::screw(&jet(0.0))), 0.0);
+    let speed: f64 = value.iter().map(|v| v * v).sum();
+    assert_near(scalar(screw::screw(&jet(pace))), pace * pace * speed);
+    // The same motion is accelerated: a turn is no straight path.
+    let centripetal = omega.powi(4) * ((x[0] - c[0]).powi(2) + (x[1] - c[1]).powi(2));
+    assert_near(scalar(acceleration::acceleration(&jet(0.0))), centripetal);
 }
 
 #[test]
@@ -279,7 +337,20 @@ fn terms<B: TrainBackend>() -> Vec<(&'static str, bool, bool, fn(&Scene<B>) -> T
         ("divergence", false, true, |s| {
             divergence::divergence(&s.v_jet())
         }),
-        ("strain", false, true, |s| strain::strain(&s.v_jet())),
+        ("strain", false, true, |s| strain::strain(&s.v_jet(), 0.0)),
+        ("strain of a scale", false, true, |s| {
+            strain::strain(&s.v_jet(), 0.3)
+        }),
+        ("deviatoric", false, true, |s| {
+            deviatoric::deviatoric(&s.v_jet())
+        }),
+        ("stretch", false, true, |s| {
+            stretch::stretch(&s.v_jet(), points(&[[0.0, 0.6, 0.8]; 3]))
+        }),
+        ("screw", false, true, |s| screw::screw(&s.v_jet())),
+        ("acceleration", false, true, |s| {
+            acceleration::acceleration(&s.v_jet())
+        }),
         ("steadiness", false, true, |s| {
             steadiness::steadiness(&s.v_jet())
         }),

@@ -195,8 +195,6 @@ impl Operators for Derivatives {
 /// Carries positions and surface normals along `V` together:
 /// `dx/dt = V(x, t)`, `dn/dt = -J^T n`, the normals renormalised at the end.
 ///
-/// The normal of a surface that moves with `V` is a covector, hence the transposed Jacobian.
-///
 /// # Shapes
 /// `x`, `n`: `[n, 3]`; `from`, `to`: `[n, 1]`.
 #[expect(
@@ -213,16 +211,36 @@ pub fn transport<B: ModelBackend>(
     steps: Steps,
     integrator: Integrator,
 ) -> (Tensor<B, 2>, Tensor<B, 2>) {
+    let (x, n) = transport_gradient(operators, net, x, n, from, to, steps, integrator);
+    (x, n.clone() / length(n))
+}
+
+/// Carries positions and the gradients of a field that `V` carries: [`transport`] without the last step.
+///
+/// The gradient of what moves with `V` is a covector, hence the transposed Jacobian: if `f(phi(x, t), t)`
+/// stays what it was, `grad f` at `phi(x, t)` is what arrives.
+#[expect(clippy::too_many_arguments, reason = "as for `transport`")]
+pub fn transport_gradient<B: ModelBackend>(
+    operators: &impl Operators,
+    net: &VelocityNet<B>,
+    x: Tensor<B, 2>,
+    gradient: Tensor<B, 2>,
+    from: Tensor<B, 2>,
+    to: Tensor<B, 2>,
+    steps: Steps,
+    integrator: Integrator,
+) -> (Tensor<B, 2>, Tensor<B, 2>) {
     let count = x.dims()[0];
     let rhs = |state: Tensor<B, 2>, t: Tensor<B, 2>| {
         let x = state.clone().slice([0..count, 0..3]);
-        let n = state.slice([0..count, 3..6]);
-        let (velocity, pulled) = operators.pulled_back(net, x, t, n);
+        let gradient = state.slice([0..count, 3..6]);
+        let (velocity, pulled) = operators.pulled_back(net, x, t, gradient);
         Tensor::cat(vec![velocity, -pulled], 1)
     };
-    let state = integrate(rhs, Tensor::cat(vec![x, n], 1), from, to, steps, integrator);
-    let n = state.clone().slice([0..count, 3..6]);
-    (state.slice([0..count, 0..3]), n.clone() / length(n))
+    let state = Tensor::cat(vec![x, gradient], 1);
+    let state = integrate(rhs, state, from, to, steps, integrator);
+    let gradient = state.clone().slice([0..count, 3..6]);
+    (state.slice([0..count, 0..3]), gradient)
 }
 
 /// The length of each row, `[n, c]` to `[n, 1]`; its gradient is finite at a row of zeros.

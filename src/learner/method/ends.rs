@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use burn::module::AutodiffModule;
 use isomorph_model::baseline::blend::{SdfBlend, SdfBlendConfig};
-use isomorph_model::baseline::ends::{EndSamples, EndWeights};
+use isomorph_model::baseline::ends::EndSamples;
 use isomorph_model::baseline::lipmlp::{LipMlp, LipMlpConfig};
 use isomorph_model::baseline::mlp::{PlainMlp, PlainMlpConfig};
 use isomorph_model::{Geometry, Motion, Objective, TrainBackend};
@@ -16,8 +16,8 @@ use crate::learner::checkpoint::{Checkpoint, CheckpointError};
 use crate::learner::event::Phase;
 use crate::learner::posed::{Posed, Slopes};
 use crate::learner::schedule::Schedule;
-use crate::learner::settings::Settings;
-use crate::recipe::{LossRecipe, Recipe};
+use crate::learner::settings::{Settings, end_weights};
+use crate::recipe::Recipe;
 use crate::tensors::{column, rows};
 
 /// A network that knows what its step at the ends minimises.
@@ -161,17 +161,6 @@ impl<B: TrainBackend> EndNet<B> for LipMlp<B> {
     }
 
     const DISTANCES: bool = true;
-}
-
-/// The weights of the terms at the ends.
-pub(super) fn end_weights(loss: &LossRecipe) -> EndWeights {
-    EndWeights {
-        // As in our own method: the paper adds the means over the two shapes, and this is their mean.
-        data: 2.0 * loss.data,
-        normals: loss.normals,
-        eikonal: loss.eikonal,
-        off_surface: loss.off_surface,
-    }
 }
 
 /// The samples of a step, on the host, and what they become on the device.

@@ -3,6 +3,7 @@
 //! | file | methods (`method.name` in the recipe) |
 //! |---|---|
 //! | `velocity_field.rs` | `velocity-field`: `f(x, t)` carried by `V`, the paper's and ours |
+//! | `flow.rs` | the same with `implicit.geometry = "flow"` |
 //! | `ends.rs` | `mlp`, `sdf-blend`, `lipmlp`: fitted at t = 0 and t = 1 only |
 //! | `nise.rs` | `nise`, `nise-velocity` |
 //! | `eigenbasis.rs` | `eigenbasis` |
@@ -13,6 +14,7 @@
 
 mod eigenbasis;
 mod ends;
+mod flow;
 mod nfgp;
 mod nise;
 mod velocity_field;
@@ -29,7 +31,7 @@ use super::checkpoint::{self, Checkpoint, CheckpointError};
 use super::event::Phase;
 use super::optimiser::{self, AdamOf};
 use super::posed::{Posed, Slopes};
-use crate::recipe::{MethodName, Recipe};
+use crate::recipe::{GeometryKind, MethodName, Recipe};
 use crate::shape::{Bounds, NeighbourSearch, Pair, SignedDistance};
 
 /// The learning rates of a step; 0 for what the method does not have.
@@ -104,9 +106,12 @@ pub fn build<B: TrainBackend>(
     device: &B::Device,
 ) -> Box<dyn Method<B>> {
     match recipe.method.name {
-        MethodName::VelocityField => {
-            Box::new(velocity_field::VelocityField::<B>::new(recipe, device))
-        }
+        MethodName::VelocityField => match recipe.implicit.geometry {
+            GeometryKind::Network => {
+                Box::new(velocity_field::VelocityField::<B>::new(recipe, device))
+            }
+            GeometryKind::Flow => Box::new(flow::Flow::<B>::new(recipe, bounds, device)),
+        },
         MethodName::Mlp => Box::new(ends::FitMlp::<B>::new(recipe, device)),
         MethodName::SdfBlend => Box::new(ends::FitBlend::<B>::new(recipe, device)),
         MethodName::Lipmlp => Box::new(ends::FitLipMlp::<B>::new(recipe, device)),

@@ -13,14 +13,14 @@ use isomorph_model::baseline::blend::{SdfBlend, SdfBlendConfig};
 use isomorph_model::baseline::nise::{BetweenSamples, Evolution, Nise, NiseConfig, NiseWeights};
 use isomorph_model::{Geometry, ImplicitNetConfig, Motion, TrainBackend};
 
-use super::ends::{Drawn, end_weights};
+use super::ends::Drawn;
 use super::{Method, Rates, Records, Trainee, TrainingData, parts};
 use crate::learner::batch::Part;
 use crate::learner::checkpoint::{Checkpoint, CheckpointError};
 use crate::learner::event::Phase;
 use crate::learner::posed::{Posed, Slopes};
 use crate::learner::schedule::Schedule;
-use crate::learner::settings::Settings;
+use crate::learner::settings::{Settings, end_weights};
 use crate::recipe::{MethodName, MethodRecipe, Recipe};
 use crate::tensors::{column, rows};
 

@@ -4,12 +4,13 @@
 use std::io;
 
 use burn::module::Module;
-use isomorph_model::{Geometry, ImplicitNet, Motion, TrainBackend, VelocityNet};
+use isomorph_model::{Geometry, ImplicitNet, TrainBackend, VelocityNet};
 
 use super::{Method, Rates, Records, Trainee, TrainingData, parts};
 use crate::learner::batch::{self, BatchSizes, Part};
 use crate::learner::checkpoint::{Checkpoint, CheckpointError};
 use crate::learner::event::Phase;
+use crate::learner::motion::Motion;
 use crate::learner::posed::{Posed, Slopes};
 use crate::learner::schedule::Schedule;
 use crate::learner::settings::Settings;
@@ -64,13 +65,15 @@ impl<B: TrainBackend> Method<B> for VelocityField<B> {
         let batch = batch::draw(&data.pair, training, sizes, step).part(part);
         let (f, v) = (self.implicit.replica(), self.velocity.replica());
         let step = Step {
-            settings: &self.settings,
-            sizes: sizes.part(part.of),
+            motion: Motion {
+                settings: &self.settings,
+                sizes: sizes.part(part.of),
+                v: &v,
+                device: &self.device,
+            },
             phase: self.schedule.phase(step),
             ramp: self.schedule.ramp(step),
             f: &f,
-            v: &v,
-            device: &self.device,
         };
         Posed::new(step.objective(&batch)).by(f).by(v)
     }
@@ -107,7 +110,7 @@ impl<B: TrainBackend> Method<B> for VelocityField<B> {
         Some(Box::new(self.implicit.valid()))
     }
 
-    fn motion(&self) -> Option<Box<dyn Motion<B::InnerBackend>>> {
+    fn motion(&self) -> Option<Box<dyn isomorph_model::Motion<B::InnerBackend>>> {
         Some(Box::new(self.velocity.valid()))
     }
 }

@@ -39,6 +39,9 @@ loss.smoothness-alpha          0       -1e-9    3e38     inf
 loss.smoothness-gamma          0       -1e-9    3e38     inf
 loss.divergence                0       -1e-9    3e38     nan
 loss.strain                    0       -1e-9    3e38     inf
+loss.strain-scale              0       -1e-9    3e38     inf
+loss.deviatoric                0       -1e-9    3e38     inf
+loss.stretch                   0       -1e-9    3e38     inf
 loss.matching                  0       -1e-9    3e38     inf
 loss.matching-warm-up          0       -1e-9    3e38     inf
 loss.matching-scale            0       -1e-9    3e38     inf
@@ -49,6 +52,8 @@ loss.on-surface                0       -1e-9    3e38     inf
 loss.transported-normals       0       -1e-9    3e38     inf
 loss.off-surface               0       -1e-9    3e38     inf
 loss.steadiness                0       -1e-9    3e38     inf
+loss.screw                     0       -1e-9    3e38     inf
+loss.acceleration              0       -1e-9    3e38     inf
 training.steps                 1       0        10000000 10000001
 training.batch                 64      63       1000000  1000001
 training.correspondence-batch  1       0        1000000  1000001
@@ -126,11 +131,12 @@ const KNOWN: &str = "data.correspondences=same-vertices";
 fn every_word_is_admitted_and_no_other() {
     let words = [
         ("data.normals", "auto given estimate none"),
-        ("data.correspondences", "none same-vertices pairs.csv"),
+        ("data.correspondences", "none same-vertices match pairs.csv"),
         (
             "method.name",
             "velocity-field mlp sdf-blend lipmlp nise nise-velocity eigenbasis nfgp",
         ),
+        ("implicit.geometry", "network flow"),
         ("implicit.activation", "softplus sine"),
         ("velocity.activation", "softplus sine"),
         ("velocity.time-dependent", "true false"),

@@ -18,7 +18,7 @@ impl Workplace {
     }
 
     /// One with `source.ply`, `target.ply` and `recipe.toml`: the two shapes, equal in their vertices,
-    /// and `preset = "quick"` with more keys, each as in `training.steps=20`.
+    /// and `preset = "quick"` with [`NETWORK`] and more keys, each as in `training.steps=20`.
     pub fn with_pair(source: &Mesh, target: &Mesh, keys: &[&str]) -> Self {
         let place = Self::new();
         place.write("source.ply", ply::text(source));
@@ -29,7 +29,10 @@ impl Workplace {
         if source.vertices.len() == target.vertices.len() {
             recipe.push_str("data.correspondences = \"same-vertices\"\n");
         }
-        for key in keys {
+        let name = |key: &str| key.split([' ', '=']).next().map(str::to_owned);
+        let given = |key: &str| keys.iter().any(|other| name(other) == name(key));
+        let network = NETWORK.iter().filter(|key| !given(key));
+        for key in network.chain(keys) {
             recipe.push_str(key);
             recipe.push('\n');
         }
@@ -101,6 +104,20 @@ impl Workplace {
         names(self.0.path())
     }
 }
+
+/// The paper's geometry, on which most tests were made: one network `f(x, t)` of softplus with all phases of
+/// training, and a stationary `V`. Keys that a test gives itself go before these.
+const NETWORK: &[&str] = &[
+    "implicit.geometry = \"network\"",
+    "implicit.activation = \"softplus\"",
+    "implicit.beta = 100",
+    "velocity.time-dependent = false",
+    "loss.screw = 0",
+    "training.learning-rate = 2e-3",
+    "training.velocity-until = 0.7",
+    "training.integrator = \"midpoint\"",
+    "training.time-steps = 3",
+];
 
 /// Keys with which a step takes milliseconds.
 const TINY: &[&str] = &[

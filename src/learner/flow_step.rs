@@ -1,0 +1,88 @@
+//! One step's objective where the geometry is the flow's ([`isomorph_model::FlowGeometry`]): two end
+//! fields `g` and `h` fitted to their own shapes, and a velocity field that takes each to the other.
+//!
+//! ```text
+//! on-surface   mean (|h(phi_{0 -> 1}(x_0))| + |g(phi_{1 -> 0}(x_1))|) / 2
+//! ```
+//!
+//! over given points of both shapes: all of the source must arrive on the target and the reverse, with or
+//! without correspondences. It moves `V` alone, the end fields are constants of it. As
+//! `f(phi(x_0, t), t) = (1 - t) g(x_0) + t h(phi(x_0, 1))`, it is also what the term of that name asks of
+//! the other geometry at every time.
+
+use burn::module::Module;
+use burn::tensor::Tensor;
+use isomorph_model::baseline::blend::SdfBlend;
+use isomorph_model::baseline::ends::EndSamples;
+use isomorph_model::loss::data;
+use isomorph_model::{ImplicitNet, Objective, TrainBackend};
+
+use crate::learner::batch::Batch;
+use crate::learner::event::Phase;
+use crate::learner::motion::{Motion, has_priors};
+use crate::learner::settings::end_weights;
+
+/// What one step is made from.
+pub struct FlowStep<'a, B: TrainBackend> {
+    /// The Velocity-Net, the samples' numbers, weights and methods.
+    pub motion: Motion<'a, B>,
+    /// Decides which networks train.
+    pub phase: Phase,
+    /// The share of the weight of the term that takes each surface onto the other.
+    pub ramp: f64,
+    /// The end fields.
+    pub ends: &'a SdfBlend<B>,
+}
+
+impl<B: TrainBackend> FlowStep<'_, B> {
+    /// The terms of the objective: of the end fields at `samples`, of the source and of the target, and of
+    /// the velocity field at the batch.
+    pub fn objective(&self, batch: &Batch, samples: [&EndSamples<B>; 2]) -> Objective<B> {
+        let settings = self.motion.settings;
+        let weights = end_weights(&settings.loss);
+        let mut objective = self
+            .ends
+            .objective(samples, &weights, &settings.derivatives);
+        if self.phase != Phase::ImplicitOnly {
+            self.motion_terms(batch, &mut objective);
+        }
+        objective
+    }
+
+    fn motion_terms(&self, batch: &Batch, objective: &mut Objective<B>) {
+        let loss = &self.motion.settings.loss;
+        let weight = self.ramp * loss.on_surface;
+        let across: Vec<f32> = match weight > 0.0 {
+            true => batch.starts.times.iter().map(|time| 1.0 - time).collect(),
+            false => Vec::new(),
+        };
+        let matching = match self.ramp > 0.0 {
+            true => loss.matching,
+            false => loss.matching_warm_up,
+        };
+        let arrived = self
+            .motion
+            .carry_tracked(batch, &across, matching, objective);
+        if let Some(arrived) = arrived {
+            objective.add("on-surface", weight, || self.distance(arrived));
+        }
+        if has_priors(loss) {
+            let still = self.motion.carry_constants(batch, loss.stretch > 0.0);
+            let at = self.motion.collocation(batch, &still);
+            self.motion.priors(&at, false, objective);
+        }
+    }
+
+    /// The mean distance of what arrived from the surface where it should be: the source's points first.
+    fn distance(&self, arrived: Tensor<B, 2>) -> Tensor<B, 1> {
+        let [count, _] = arrived.dims();
+        let value = |net: &ImplicitNet<B>, start: usize, end: usize| {
+            let x = arrived.clone().slice([start..end, 0..3]);
+            let t = Tensor::zeros([end - start, 1], self.motion.device);
+            net.clone().no_grad().forward(x, t)
+        };
+        let on_target = value(self.ends.target(), 0, count / 2);
+        let on_source = value(self.ends.source(), count / 2, count);
+        data::data(Tensor::cat(vec![on_target, on_source], 0))
+    }
+}

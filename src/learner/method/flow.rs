@@ -1,0 +1,152 @@
+//! The flow's geometry (`implicit.geometry = "flow"`): two end fields and the velocity field that carries
+//! them, trained side by side. The end fields train in all steps, the velocity field as the schedule says.
+
+use std::io;
+
+use burn::module::Module;
+use isomorph_model::baseline::blend::{SdfBlend, SdfBlendConfig};
+use isomorph_model::{FlowGeometry, Geometry, TrainBackend, VelocityNet};
+
+use super::ends::Drawn;
+use super::{Method, Rates, Records, Trainee, TrainingData, parts};
+use crate::learner::batch::{self, BatchSizes, Part};
+use crate::learner::checkpoint::{Checkpoint, CheckpointError};
+use crate::learner::event::Phase;
+use crate::learner::flow_step::FlowStep;
+use crate::learner::motion::Motion;
+use crate::learner::posed::{Posed, Slopes};
+use crate::learner::schedule::Schedule;
+use crate::learner::settings::Settings;
+use crate::recipe::Recipe;
+use crate::shape::Bounds;
+use crate::tensors::rows;
+
+/// Points to a side of the lattice that decides how finely the geometry follows the flow.
+const PROBES: usize = 24;
+
+/// The end fields, the Velocity-Net and how they are trained.
+pub(super) struct Flow<B: TrainBackend> {
+    settings: Settings,
+    schedule: Schedule,
+    device: B::Device,
+    /// What holds both shapes and the space around them.
+    bounds: Bounds,
+    ends: Trainee<B, SdfBlend<B>>,
+    velocity: Trainee<B, VelocityNet<B>>,
+}
+
+impl<B: TrainBackend> Flow<B> {
+    /// All networks as the recipe's seed makes them; `bounds` encloses both shapes, normalised.
+    pub(super) fn new(recipe: &Recipe, bounds: &Bounds, device: &B::Device) -> Self {
+        let settings = Settings::new(recipe);
+        let seed = settings.training.seed;
+        let implicit = settings.implicit;
+        let ends = SdfBlendConfig { implicit }.init(seed, device);
+        // The end fields take `seed` and the one after it.
+        let velocity = settings.velocity.init(seed.wrapping_add(2), device);
+        Self {
+            schedule: Schedule::new(&settings.training),
+            bounds: bounds.padded(settings.training.box_margin as f32),
+            ends: Trainee::new("ends", ends, device),
+            velocity: Trainee::new("velocity", velocity, device),
+            device: device.clone(),
+            settings,
+        }
+    }
+}
+
+impl<B: TrainBackend> Method<B> for Flow<B> {
+    fn phase(&self, step: usize) -> Phase {
+        // The end fields train from the first step, so that there is no warm-up of the velocity alone.
+        match self.schedule.phase(step) {
+            Phase::WarmUp => Phase::Ramp,
+            phase => phase,
+        }
+    }
+
+    fn rates(&self, step: usize) -> Rates {
+        let training = &self.settings.training;
+        let (first, steps) = (training.learning_rate, training.steps);
+        Rates {
+            implicit: self.schedule.rate(first, step, 0, steps),
+            velocity: self.schedule.velocity_rate(step),
+        }
+    }
+
+    fn parts(&self) -> usize {
+        parts::<B>(self.settings.training.batch)
+    }
+
+    fn objective(&self, data: &TrainingData, step: usize, part: Part) -> Posed<B> {
+        let (settings, device) = (&self.settings, &self.device);
+        let training = &settings.training;
+        let sizes = BatchSizes::new(training, data.pair.correspondences.len(), part.of);
+        let batch = batch::draw(&data.pair, training, sizes, step).part(part);
+        let [source, target] = Drawn::new(data, settings, step, part, false, device).apart();
+        let (ends, v) = (self.ends.replica(), self.velocity.replica());
+        let step = FlowStep {
+            motion: Motion {
+                settings,
+                sizes: sizes.part(part.of),
+                v: &v,
+                device,
+            },
+            phase: self.phase(step),
+            ramp: self.schedule.ramp(step),
+            ends: &ends,
+        };
+        Posed::new(step.objective(&batch, [&source, &target]))
+            .by(ends)
+            .by(v)
+    }
+
+    fn descend(&mut self, step: usize, slopes: &mut Slopes) {
+        let clip = self.settings.training.clip;
+        let (phase, rates) = (self.phase(step), self.rates(step));
+        self.ends.advance(slopes.take(0), rates.implicit, clip);
+        if phase != Phase::ImplicitOnly {
+            self.velocity.advance(slopes.take(1), rates.velocity, clip);
+        }
+    }
+
+    fn networks(&self) -> Vec<(&'static str, usize)> {
+        let (ends, v) = (&self.ends.net, &self.velocity.net);
+        vec![("g and h", ends.num_params()), ("V", v.num_params())]
+    }
+
+    fn records(&self) -> io::Result<Records> {
+        let mut records = Records::default();
+        self.ends.record(&mut records)?;
+        self.velocity.record(&mut records)?;
+        Ok(records)
+    }
+
+    fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
+        self.ends.restore(checkpoint)?;
+        self.velocity.restore(checkpoint)
+    }
+
+    fn geometry(&self) -> Option<Box<dyn Geometry<B::InnerBackend>>> {
+        let probes = rows(&lattice(&self.bounds), &self.device);
+        let (ends, velocity) = (self.ends.valid(), self.velocity.valid());
+        Some(Box::new(FlowGeometry::new(ends, velocity, probes)))
+    }
+
+    fn motion(&self) -> Option<Box<dyn isomorph_model::Motion<B::InnerBackend>>> {
+        Some(Box::new(self.velocity.valid()))
+    }
+}
+
+/// The middles of equal cells of a box.
+fn lattice(bounds: &Bounds) -> Vec<[f32; 3]> {
+    let at = |axis: usize, k: usize| {
+        let (low, high) = (bounds.min[axis], bounds.max[axis]);
+        low + (high - low) * (k as f32 + 0.5) / PROBES as f32
+    };
+    let of = |k: usize| [k / (PROBES * PROBES), k / PROBES % PROBES, k % PROBES];
+    let points = (0..PROBES.pow(3)).map(|k| {
+        let of = of(k);
+        std::array::from_fn(|axis| at(axis, of[axis]))
+    });
+    points.collect()
+}

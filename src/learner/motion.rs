@@ -1,0 +1,241 @@
+//! What a step asks of the Velocity-Net: trajectories, the matching term, and the priors. The same for
+//! both geometries.
+
+use burn::module::AutodiffModule;
+use burn::tensor::Tensor;
+use isomorph_model::loss::{
+    acceleration, deviatoric, divergence, matching, screw, smoothness, steadiness, strain, stretch,
+};
+use isomorph_model::operators::{Operators, VelocityJet, VelocityRequest, transport};
+use isomorph_model::trajectory::integrate;
+use isomorph_model::{Objective, TrainBackend, VelocityNet};
+
+use crate::learner::batch::{Batch, BatchSizes};
+use crate::learner::settings::Settings;
+use crate::recipe::LossRecipe;
+use crate::tensors::{column, rows};
+
+/// The Velocity-Net in one step.
+#[derive(Clone, Copy)]
+pub struct Motion<'a, B: TrainBackend> {
+    /// Weights and methods.
+    pub settings: &'a Settings,
+    /// How many samples of each kind.
+    pub sizes: BatchSizes,
+    /// The Velocity-Net.
+    pub v: &'a VelocityNet<B>,
+    /// Where tensors live.
+    pub device: &'a B::Device,
+}
+
+/// The samples at the times to which `V` carries them, as constants.
+pub struct Still<B: TrainBackend> {
+    /// `[n, 3]`.
+    pub positions: Tensor<B::InnerBackend, 2>,
+    /// Transported normals, `[n, 3]`, where they were asked for and the data has normals.
+    pub normals: Option<Tensor<B::InnerBackend, 2>>,
+}
+
+/// Points and times at which the terms between the ends are taken, constants: the band first, then the
+/// box.
+pub struct Collocation<B: TrainBackend> {
+    /// `[n, 3]`.
+    pub x: Tensor<B, 2>,
+    /// `[n, 1]`.
+    pub t: Tensor<B, 2>,
+    /// The normals of the carried points that the band lies around, `[band, 3]`, if they are known.
+    pub normals: Option<Tensor<B, 2>>,
+}
+
+/// Whether the batch has a normal at every point that is carried.
+pub fn has_normals(batch: &Batch) -> bool {
+    batch.starts.normals.len() == batch.starts.points.len()
+}
+
+impl<B: TrainBackend> Motion<'_, B> {
+    /// Carries the correspondences to the other end, which gives the matching term of weight `weight`,
+    /// and with them the starts to `stops`, none if that is empty: the positions of these.
+    pub fn carry_tracked(
+        &self,
+        batch: &Batch,
+        stops: &[f32],
+        weight: f64,
+        objective: &mut Objective<B>,
+    ) -> Option<Tensor<B, 2>> {
+        let matched = self.sizes.matched;
+        let (sources, targets) = &batch.matched;
+        let mut x = [&sources[..], targets].concat();
+        let mut from = [vec![0.0; matched], vec![1.0; matched]].concat();
+        let mut to = [vec![1.0; matched], vec![0.0; matched]].concat();
+        if !stops.is_empty() {
+            x.extend(&batch.starts.points);
+            from.extend(&batch.starts.times);
+            to.extend(stops);
+        }
+        if x.is_empty() {
+            return None;
+        }
+        let (from, to) = (column(&from, self.device), column(&to, self.device));
+        let (steps, integrator) = (self.settings.steps, self.settings.integrator);
+        let rhs = |x, t| self.v.forward(x, t);
+        let arrived = integrate(rhs, self.rows(&x), from, to, steps, integrator);
+        if matched > 0 {
+            objective.add("matching", weight, || {
+                let marks = self.rows(&[&targets[..], sources].concat());
+                let there = arrived.clone().slice([0..2 * matched, 0..3]);
+                matching::matching(there, marks, self.settings.loss.matching_scale)
+            });
+        }
+        (!stops.is_empty()).then(|| arrived.slice([2 * matched..x.len(), 0..3]))
+    }
+
+    /// Carries the starts to the stops of the batch without a graph, with their normals if they are wanted
+    /// and there are any.
+    pub fn carry_constants(&self, batch: &Batch, normals: bool) -> Still<B> {
+        let settings = self.settings;
+        let v = self.v.valid();
+        let x = rows::<B::InnerBackend>(&batch.starts.points, self.device);
+        let from = column::<B::InnerBackend>(&batch.starts.times, self.device);
+        let to = column::<B::InnerBackend>(&batch.stops, self.device);
+        let (steps, integrator) = (settings.steps, settings.integrator);
+        if normals && has_normals(batch) {
+            let n = rows::<B::InnerBackend>(&batch.starts.normals, self.device);
+            let operators = &settings.derivatives;
+            let (positions, n) = transport(operators, &v, x, n, from, to, steps, integrator);
+            Still {
+                positions,
+                normals: Some(n),
+            }
+        } else {
+            let rhs = |x, t| v.forward(x, t);
+            Still {
+                positions: integrate(rhs, x, from, to, steps, integrator),
+                normals: None,
+            }
+        }
+    }
+
+    /// The collocation points of a batch whose carried points are `still`.
+    pub fn collocation(&self, batch: &Batch, still: &Still<B>) -> Collocation<B> {
+        let (band, count) = (self.sizes.band, 2 * self.sizes.carried);
+        let repeats = band.div_ceil(count).max(1);
+        let around = |carried: Tensor<B::InnerBackend, 2>| {
+            let [_, columns] = carried.dims();
+            let repeated = Tensor::from_inner(carried).repeat_dim(0, repeats);
+            repeated.slice([0..band, 0..columns])
+        };
+        let mut x = Vec::new();
+        let mut t = Vec::new();
+        let mut normals = None;
+        if band > 0 {
+            x.push(around(still.positions.clone()) + self.rows(&batch.offsets));
+            t.push(around(column(&batch.stops, self.device)));
+            normals = still.normals.clone().map(around);
+        }
+        if self.sizes.uniform > 0 {
+            x.push(self.rows(&batch.uniform.points));
+            t.push(column(&batch.uniform.times, self.device));
+        }
+        Collocation {
+            x: Tensor::cat(x, 0),
+            t: Tensor::cat(t, 0),
+            normals,
+        }
+    }
+
+    /// The priors of `V` at the collocation points, and its jet there: `None` if nothing needs it.
+    pub fn priors(
+        &self,
+        at: &Collocation<B>,
+        wanted: bool,
+        objective: &mut Objective<B>,
+    ) -> Option<VelocityJet<B>> {
+        let loss = &self.settings.loss;
+        if !wanted && !has_priors(loss) {
+            return None;
+        }
+        let request = VelocityRequest {
+            laplacian: loss.smoothness > 0.0 && loss.smoothness_alpha > 0.0,
+            rate: needs_rate(loss),
+        };
+        let operators = &self.settings.derivatives;
+        let jet = operators.velocity_jet(self.v, at.x.clone(), at.t.clone(), request);
+        let (alpha, gamma) = (loss.smoothness_alpha, loss.smoothness_gamma);
+        objective.add("smoothness", loss.smoothness, || {
+            smoothness::smoothness(&jet, alpha, gamma)
+        });
+        objective.add("divergence", loss.divergence, || {
+            divergence::divergence(&jet)
+        });
+        objective.add("steadiness", loss.steadiness, || {
+            steadiness::steadiness(&jet)
+        });
+        if self.sizes.band > 0 {
+            self.band_priors(&jet.first(self.sizes.band), at, objective);
+        }
+        Some(jet)
+    }
+
+    /// The priors that hold near the surface only.
+    fn band_priors(&self, jet: &VelocityJet<B>, at: &Collocation<B>, objective: &mut Objective<B>) {
+        let loss = &self.settings.loss;
+        objective.add("strain", loss.strain, || {
+            strain::strain(jet, loss.strain_scale)
+        });
+        objective.add("deviatoric", loss.deviatoric, || {
+            deviatoric::deviatoric(jet)
+        });
+        if let Some(normals) = &at.normals {
+            objective.add("stretch", loss.stretch, || {
+                stretch::stretch(jet, normals.clone())
+            });
+        }
+        objective.add("screw", loss.screw, || screw::screw(jet));
+        objective.add("acceleration", loss.acceleration, || {
+            acceleration::acceleration(jet)
+        });
+    }
+
+    /// The jet of a `V` that does not train, as constants.
+    pub fn constant_jet(&self, at: &Collocation<B>) -> VelocityJet<B> {
+        let still = self.v.valid();
+        let (x, t) = (at.x.clone().inner(), at.t.clone().inner());
+        let request = VelocityRequest::default();
+        let operators = &self.settings.derivatives;
+        constant(operators.velocity_jet(&still, x, t, request))
+    }
+
+    fn rows(&self, points: &[[f32; 3]]) -> Tensor<B, 2> {
+        rows(points, self.device)
+    }
+}
+
+/// Whether any term is made of the jet of `V` alone.
+pub fn has_priors(loss: &LossRecipe) -> bool {
+    let weights = [
+        loss.smoothness,
+        loss.divergence,
+        loss.strain,
+        loss.deviatoric,
+        loss.stretch,
+        loss.steadiness,
+        loss.screw,
+        loss.acceleration,
+    ];
+    weights.iter().any(|weight| *weight > 0.0)
+}
+
+/// Whether any term is made of `dV/dt`.
+pub fn needs_rate(loss: &LossRecipe) -> bool {
+    loss.steadiness > 0.0 || loss.screw > 0.0 || loss.acceleration > 0.0
+}
+
+/// A jet of the inner backend as constants of the training backend.
+fn constant<B: TrainBackend>(jet: VelocityJet<B::InnerBackend>) -> VelocityJet<B> {
+    VelocityJet {
+        value: Tensor::from_inner(jet.value),
+        jacobian: Tensor::from_inner(jet.jacobian),
+        laplacian: jet.laplacian.map(Tensor::from_inner),
+        rate: jet.rate.map(Tensor::from_inner),
+    }
+}

@@ -1,0 +1,195 @@
+//! Pairs of points of two shapes that belong together, found from the shapes alone.
+//!
+//! ```text
+//! two shapes -> surfaces -> rigid motion -> registration there -> pairs, each with a confidence
+//!                                        \> registration back /
+//! ```
+//!
+//! | file | what it does |
+//! |---|---|
+//! | `surface.rs` | 20,000 points on a shape, 1,500 nodes among them that carry the rest, how remote each is |
+//! | `graph.rs` | distances along a surface, which keep near sheets apart |
+//! | `rigid.rs` | the rigid motion to begin with, where the shapes are not in one frame |
+//! | `assignment.rs` | which node belongs to which, softly and in both directions at once |
+//! | `elastic.rs` | nodes that move as rigidly as possible but for joints |
+//! | `register.rs` | assignment and motion in turn, from far and stiff to near and yielding |
+//! | `pairs.rs` | mutual nearest neighbours under both registrations, their confidence, coverage, the way there and back |
+//! | `options.rs`, `outcome.rs`, `error.rs` | what goes in, what comes out, what is refused |
+//! | `rotation.rs` | rotations nearest to a matrix |
+//!
+//! The registration is expectation maximisation in the manner of coherent point drift (Myronenko
+//! and Song, "Point set registration: coherent point drift", TPAMI 32, 2010): soft assignments
+//! under a falling standard deviation, and a motion that follows them as far as a prior lets it.
+//!
+//! # Differs from coherent point drift
+//! The prior is as-rigid-as-possible motion of ties along the surface, with joints, instead of a
+//! smooth displacement: limbs turn by large angles and keep their length, and legs that nearly
+//! touch move apart. Assignments sum to at most 1 in both directions. Normals take part, and until
+//! half-way how remote a point is from all others along the surface, which does not change with the
+//! pose. In the end surfaces slide along each other freely.
+//!
+//! What it cannot do: tell apart what is alike in form (a sphere turned about its centre, a limb
+//! about its own axis); follow parts that touch in one shape and not in the other beyond what their
+//! normals say; find what turns by more than about a right angle and has no limb to hold on to.
+
+mod assignment;
+mod elastic;
+mod error;
+mod graph;
+mod options;
+mod outcome;
+mod pairs;
+mod register;
+mod rigid;
+mod rotation;
+mod surface;
+
+use std::time::Instant;
+
+use rayon::prelude::*;
+
+pub use error::MatchError;
+pub use options::MatchOptions;
+pub use outcome::{Coverage, Cycle, Matching, Quantiles, Rigid};
+pub use pairs::{MatchedPair, TOLERANCE};
+pub use rotation::RigidMotion;
+
+use crate::shape::{Normalisation, Shape};
+use pairs::{Laid, Sites};
+use surface::{NodeMotion, Surface, farthest_points};
+
+/// A surface counts as covered where a matched vertex is within this distance, in normalised units
+/// (mean area 1).
+pub const COVERAGE_RADIUS: f64 = 0.05;
+
+/// Finds the vertices of two shapes that belong together.
+///
+/// The same shapes and options give the same pairs, whatever the number of cores.
+///
+/// # Errors
+/// [`MatchError::Option`] if an option is out of range, [`MatchError::Shape`] if a shape has no
+/// area, [`MatchError::NoPairs`] if nothing is sure enough.
+pub fn match_shapes(
+    source: &Shape,
+    target: &Shape,
+    options: &MatchOptions,
+) -> Result<Matching, MatchError> {
+    let clock = Instant::now();
+    options.checked()?;
+    let shapes = [source, target];
+    let frame = Normalisation::joint(&shapes)?;
+    let surface = |side: usize| {
+        let seed = options.seed.wrapping_mul(2).wrapping_add(side as u64);
+        Surface::new(shapes[side], &frame, [options.points, options.nodes], seed)
+    };
+    let [from, to] = [surface(0)?, surface(1)?];
+    let alignment = match options.aligned {
+        true => rigid::as_given(&from, &to),
+        false => rigid::align(&from, &to),
+    };
+    let [there, back] = register_both(&from, &to, &alignment.motion);
+    let laid = [(&from, &there), (&to, &back)].map(|(surface, motion)| Laid { surface, motion });
+    let found = mutual_pairs(shapes, laid, &frame);
+    let mutual = found.len();
+    let pairs = kept(found, source, &frame, options);
+    if pairs.is_empty() {
+        return Err(MatchError::NoPairs {
+            source_path: source.path.clone(),
+            target_path: target.path.clone(),
+            least: options.least_confidence,
+        });
+    }
+    let sources = places(source, pairs.iter().map(|pair| pair.source), &frame);
+    let targets = places(target, pairs.iter().map(|pair| pair.target), &frame);
+    Ok(Matching {
+        mutual,
+        coverage: Coverage {
+            radius: COVERAGE_RADIUS,
+            source: pairs::coverage(&from, &sources, COVERAGE_RADIUS),
+            target: pairs::coverage(&to, &targets, COVERAGE_RADIUS),
+        },
+        cycle: Cycle {
+            source: Quantiles::of(pairs::there_and_back(laid[0], laid[1])),
+            target: Quantiles::of(pairs::there_and_back(laid[1], laid[0])),
+        },
+        rigid: Rigid::new(&alignment, &frame),
+        scale: frame.scale,
+        seconds: clock.elapsed().as_secs_f64(),
+        pairs,
+    })
+}
+
+/// The motions there and back that agree best, of those from each width.
+fn register_both(source: &Surface, target: &Surface, start: &RigidMotion) -> [NodeMotion; 2] {
+    let way = |from, to, start: RigidMotion| -> Vec<NodeMotion> {
+        let widths = register::WIDTHS.into_par_iter();
+        widths
+            .map(|width| register::register(from, to, &start, width))
+            .collect()
+    };
+    let (there, back) = rayon::join(
+        || way(source, target, *start),
+        || way(target, source, start.inverse()),
+    );
+    let mut best: Option<(f64, [&NodeMotion; 2])> = None;
+    for [forth, counter] in there
+        .iter()
+        .flat_map(|forth| back.iter().map(move |counter| [forth, counter]))
+    {
+        let laid =
+            [(source, forth), (target, counter)].map(|(surface, motion)| Laid { surface, motion });
+        let apart = pairs::disagreement(laid[0], laid[1]);
+        if best.is_none_or(|(least, _)| apart < least) {
+            best = Some((apart, [forth, counter]));
+        }
+    }
+    let (_, motions) = best.expect("two widths make four pairs");
+    motions.map(NodeMotion::clone)
+}
+
+/// Vertices that are each other's nearest, sure or not.
+fn mutual_pairs(
+    shapes: [&Shape; 2],
+    laid: [Laid<'_>; 2],
+    frame: &Normalisation,
+) -> Vec<MatchedPair> {
+    let sites = [0, 1].map(|side| Sites::of(shapes[side], laid[side].surface, frame));
+    pairs::mutual((laid[0], &sites[0]), (laid[1], &sites[1]))
+}
+
+/// The pairs that the options ask for: sure enough, and if that is too many, spread over the
+/// source.
+fn kept(
+    mut pairs: Vec<MatchedPair>,
+    source: &Shape,
+    frame: &Normalisation,
+    options: &MatchOptions,
+) -> Vec<MatchedPair> {
+    pairs.retain(|pair| pair.confidence >= options.least_confidence);
+    if let Some(count) = options.count
+        && count < pairs.len()
+    {
+        let places = places(source, pairs.iter().map(|pair| pair.source), frame);
+        let mut spread = farthest_points(&places, count);
+        spread.sort_unstable();
+        pairs = spread
+            .into_iter()
+            .map(|kept| pairs[kept as usize])
+            .collect();
+    }
+    pairs
+}
+
+/// Vertices of a shape in normalised coordinates.
+fn places(
+    shape: &Shape,
+    vertices: impl Iterator<Item = u32>,
+    frame: &Normalisation,
+) -> Vec<[f64; 3]> {
+    vertices
+        .map(|vertex| frame.apply(shape.vertices[vertex as usize]).map(f64::from))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests;
