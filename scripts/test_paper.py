@@ -220,6 +220,19 @@ class Experiments(unittest.TestCase):
         self.assertEqual(status, 1)
         self.assertRegex(err, "run.json: seed = 0, now 1; set another --out")
 
+    def test_a_second_look_at_finished_results_changes_nothing(self):
+        self.assertEqual(self.paper("topology")[0], 0)
+        record = self.folder / "out/topology/run.json"
+        before = json.loads(record.read_text()) | {"date": "2001-01-01"}
+        record.write_text(json.dumps(before))
+        status, out, _ = self.paper("topology")
+        self.assertEqual(status, 0)
+        self.assertIn("left as it was", out)
+        self.assertEqual(json.loads(record.read_text())["date"], "2001-01-01")
+        (self.folder / "out/topology/table.md").unlink()
+        self.assertEqual(self.paper("topology")[0], 0)
+        self.assertNotEqual(json.loads(record.read_text())["date"], "2001-01-01")
+
     def test_a_failed_run_is_said_and_leaves_no_table(self):
         os.environ["FAKE_FAILS"] = "1"
         status, _, err = self.paper("sparse")

@@ -65,6 +65,7 @@ pub fn end_weights(loss: &LossRecipe) -> EndWeights {
         normals: loss.normals,
         eikonal: loss.eikonal,
         off_surface: loss.off_surface,
+        distance: loss.distance,
     }
 }
 

@@ -5,6 +5,7 @@
 //! normals      mean (1 - <n, n_given>)   on the surfaces, where normals are given
 //! eikonal      mean (|grad f| - 1)^2     on the surfaces and in space
 //! off-surface  mean exp(-100 |f|)        in space
+//! distance     mean |f - d|              in space away from the surfaces, where distances are known
 //! ```
 //!
 //! All at t = 0 and t = 1 and at no time between.
@@ -66,6 +67,8 @@ pub struct EndWeights {
     pub eikonal: f64,
     /// No zeros away from the surfaces.
     pub off_surface: f64,
+    /// The signed distance away from the surfaces; without any distances the term is left out.
+    pub distance: f64,
 }
 
 /// `f` and its derivatives at all samples of some ends, as [`EndSamples::all`] orders them.
@@ -113,6 +116,19 @@ pub(crate) fn objective<B: Backend>(ends: &[Seen<B>], weights: &EndWeights) -> O
     objective.add("off-surface", weights.off_surface, || {
         mean(&|end| loss::off_surface::off_surface(end.in_space().value))
     });
+    let measured = ends.iter().filter_map(|end| {
+        let distances = end.samples.distances.clone()?;
+        Some((end, distances))
+    });
+    let measured: Vec<_> = measured.collect();
+    if !measured.is_empty() {
+        objective.add("distance", weights.distance, || {
+            let terms = measured
+                .into_iter()
+                .map(|(end, known)| loss::distance::distance(end.in_space().value, known));
+            Tensor::cat(terms.collect(), 0).mean()
+        });
+    }
     objective
 }
 
@@ -126,6 +142,7 @@ mod tests {
         normals: 1.0,
         eikonal: 1.0,
         off_surface: 1.0,
+        distance: 1.0,
     };
 
     fn samples(normals: bool) -> EndSamples<Plain> {
@@ -135,7 +152,7 @@ mod tests {
             normals: normals.then(|| points(&[[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])),
             space: points(&[[0.5, 0.0, 0.0]]),
             space_times: column(&[1.0]),
-            distances: None,
+            distances: normals.then(|| column(&[0.2])),
         }
     }
 
@@ -159,8 +176,9 @@ mod tests {
             &WEIGHTS,
         );
         let names: Vec<_> = objective.terms().iter().map(|term| term.name).collect();
-        assert_eq!(names, ["data", "normals", "eikonal", "off-surface"]);
-        let wanted = [0.2, 0.5, 5.0 / 3.0, (-1.0f64).exp()];
+        let all = ["data", "normals", "eikonal", "off-surface", "distance"];
+        assert_eq!(names, all);
+        let wanted = [0.2, 0.5, 5.0 / 3.0, (-1.0f64).exp(), 0.19];
         for (got, wanted) in objective.read().into_iter().zip(wanted) {
             // Means of at most three f32 numbers of size 1 to 10.
             assert!((got - wanted).abs() < 2e-6, "{got}, wanted {wanted}");
@@ -186,6 +204,7 @@ mod tests {
             0.5,
             5.0 / 3.0,
             ((-1.0f64).exp() + (-3.0f64).exp()) / 2.0,
+            0.19,
         ];
         for (got, wanted) in objective.read().into_iter().zip(wanted) {
             // As above.

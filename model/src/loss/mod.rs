@@ -18,11 +18,13 @@
 //! | [`steadiness`] | `|dV/dt|^2` | ours |
 //! | [`screw`] | `|dV/dt + D V|^2` | ours |
 //! | [`acceleration`] | `|dV/dt + J V|^2` | ours |
+//! | [`distance`] | `|f - d|`, `d` the signed distance, away from the surface | ours |
 //! | [`off_surface`] | `exp(-100 |f|)` | ours, after SIREN |
 
 pub mod acceleration;
 pub mod data;
 pub mod deviatoric;
+pub mod distance;
 pub mod divergence;
 pub mod eikonal;
 pub mod level_set;

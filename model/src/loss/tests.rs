@@ -75,6 +75,9 @@ fn the_terms_on_hand_worked_points() {
         scalar(smoothness::smoothness(&v, 0.5, 1.0)),
         (3.25f64.sqrt() + 0.5) / 2.0,
     );
+    // Two far away, off by 0.3 and 0.1, and one so near that the term says nothing.
+    let (f, d) = (column(&[0.2, -0.3, 0.9]), column(&[-0.1, -0.4, 0.01]));
+    assert_near(scalar(distance::distance(f, d)), 0.4 / 3.0);
     assert_near(
         scalar(off_surface::off_surface(column(&[0.0, -0.01]))),
         (1.0 + (-1.0f64).exp()) / 2.0,
@@ -353,6 +356,9 @@ fn terms<B: TrainBackend>() -> Vec<(&'static str, bool, bool, fn(&Scene<B>) -> T
         }),
         ("steadiness", false, true, |s| {
             steadiness::steadiness(&s.v_jet())
+        }),
+        ("distance", true, false, |s| {
+            distance::distance(s.f_jet().value, column(&[0.4, -0.3, 0.2]))
         }),
         ("off-surface", true, false, |s| {
             // Scaled down: farther out the penalty is too flat to measure.

@@ -87,7 +87,8 @@ impl<B: TrainBackend, M: EndNet<B>> Method<B> for EndFit<B, M> {
 
     fn objective(&self, data: &TrainingData, step: usize, part: Part) -> Posed<B> {
         let device = &self.device;
-        let drawn = Drawn::new(data, &self.settings, step, part, M::DISTANCES, device);
+        let measured = M::DISTANCES || self.settings.loss.distance > 0.0;
+        let drawn = Drawn::new(data, &self.settings, step, part, measured, device);
         let net = self.net.replica();
         Posed::new(net.terms(&self.recipe, &self.settings, &drawn)).by(net)
     }

@@ -82,7 +82,8 @@ impl<B: TrainBackend> Method<B> for Flow<B> {
         let training = &settings.training;
         let sizes = BatchSizes::new(training, data.pair.correspondences.len(), part.of);
         let batch = batch::draw(&data.pair, training, sizes, step).part(part);
-        let [source, target] = Drawn::new(data, settings, step, part, false, device).apart();
+        let measured = settings.loss.distance > 0.0;
+        let [source, target] = Drawn::new(data, settings, step, part, measured, device).apart();
         let (ends, v) = (self.ends.replica(), self.velocity.replica());
         let step = FlowStep {
             motion: Motion {

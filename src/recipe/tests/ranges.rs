@@ -51,6 +51,7 @@ loss.eikonal                   0       -1e-9    3e38     inf
 loss.on-surface                0       -1e-9    3e38     inf
 loss.transported-normals       0       -1e-9    3e38     inf
 loss.off-surface               0       -1e-9    3e38     inf
+loss.distance                  0       -1e-9    3e38     inf
 loss.steadiness                0       -1e-9    3e38     inf
 loss.screw                     0       -1e-9    3e38     inf
 loss.acceleration              0       -1e-9    3e38     inf
