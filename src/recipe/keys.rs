@@ -203,7 +203,7 @@ sections! {
         /// Weight of |f - d| away from the surface at times 0 and 1, d the signed distance to the shape,
         /// which needs normals; not in the paper; of what is fitted at both ends, as the flow is: no
         /// surface is left where no point is.
-        distance: f64 = 10 | 10 | 0, Rule::positive_or_zero().zero("turns it off");
+        distance: f64 = 100 | 100 | 0, Rule::positive_or_zero().zero("turns it off");
         /// Weight of |dV/dt|^2, which steadies a time-dependent V; not in the paper; 1 to 10 is a
         /// good start.
         steadiness: f64 = 0 | 0 | 0, Rule::positive_or_zero().zero("turns it off");
