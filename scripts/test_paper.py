@@ -33,7 +33,7 @@ class Declarations(unittest.TestCase):
     def test_the_paper_is_covered(self):
         names = {experiment.name for experiment in experiments.EXPERIMENTS}
         wanted = "errors correspondences local-swaps global-swaps level-set divergence smoothness "
-        wanted += "sparse incomplete topology no-correspondences"
+        wanted += "sparse incomplete topology no-correspondences ablation"
         self.assertEqual(names, set(wanted.split()))
 
     def test_labels_are_unique_and_survive_the_command_line(self):

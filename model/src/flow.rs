@@ -20,7 +20,7 @@ use burn::tensor::backend::Backend;
 
 use crate::backend::ModelBackend;
 use crate::baseline::blend::{SdfBlend, between};
-use crate::morph::Geometry;
+use crate::morph::{Carried, Geometry};
 use crate::operators::reverse;
 use crate::operators::{Derivatives, transport_gradient};
 use crate::trajectory::{Integrator, Steps, integrate, steps_within};
@@ -64,27 +64,41 @@ impl<B: ModelBackend> FlowGeometry<B> {
         self.steps
     }
 
-    /// Where points that are at `x` at times `t` are at time `end`.
-    fn carried(&self, x: Tensor<B, 2>, t: Tensor<B, 2>, end: f64) -> Tensor<B, 2> {
+    /// Where points that are at `x` at times `t` are at time `end`, in `steps`.
+    fn carry(&self, x: Tensor<B, 2>, t: Tensor<B, 2>, end: f64, steps: Steps) -> Tensor<B, 2> {
         let to = t.full_like(end);
-        let steps = self.share(&t, end);
         let rhs = |x, t| self.velocity.forward(x, t);
         integrate(rhs, x, t, to, steps, Integrator::Rk4)
     }
 
-    /// The share of the steps that the longest of the spans from `t` to `end` has.
-    fn share(&self, t: &Tensor<B, 2>, end: f64) -> Steps {
-        let spans = (t.clone() - end).abs().into_data();
-        let longest = spans.iter::<f64>().fold(0.0, f64::max);
-        Steps::Even(((longest * self.steps as f64).ceil() as usize).max(1))
+    /// The share of the steps that a span of time has.
+    fn share(&self, span: f64) -> Steps {
+        Steps::Even(((span * self.steps as f64).ceil() as usize).max(1))
+    }
+
+    /// The share of the steps that the longest of the spans from `t` to each end has.
+    fn shares(&self, t: &Tensor<B, 2>) -> [Steps; 2] {
+        let times = t.clone().into_data();
+        let [least, most] = times
+            .iter::<f64>()
+            .fold([1.0_f64, 0.0], |[least, most], t| {
+                [least.min(t), most.max(t)]
+            });
+        [self.share(most), self.share(1.0 - least)]
     }
 
     /// `g(phi_{t -> 0}(x))` and `h(phi_{t -> 1}(x))`, `[n, 1]` each: one surface where the flow takes the
     /// source onto the target.
     pub fn carried_values(&self, x: Tensor<B, 2>, t: Tensor<B, 2>) -> [Tensor<B, 2>; 2] {
-        let zeros = t.zeros_like();
-        let start = self.carried(x.clone(), t.clone(), 0.0);
-        let end = self.carried(x, t, 1.0);
+        let [back, ahead] = self.shares(&t);
+        let start = self.carry(x.clone(), t.clone(), 0.0, back);
+        let end = self.carry(x, t, 1.0, ahead);
+        self.end_values(start, end)
+    }
+
+    /// `g` where the source is and `h` where the target is.
+    fn end_values(&self, start: Tensor<B, 2>, end: Tensor<B, 2>) -> [Tensor<B, 2>; 2] {
+        let zeros = Tensor::zeros([start.dims()[0], 1], &start.device());
         [
             self.ends.source().forward(start, zeros.clone()),
             self.ends.target().forward(end, zeros),
@@ -100,17 +114,43 @@ impl<B: ModelBackend> Geometry<B> for FlowGeometry<B> {
 
     /// The gradient of each end field where the point comes from, carried back along with it.
     fn gradient(&self, x: Tensor<B, 2>, t: Tensor<B, 2>) -> Tensor<B, 2> {
-        let gradient = |net, end: f64| {
+        let gradient = |net, end: f64, steps: Steps| {
             let from = t.full_like(end);
-            let there = self.carried(x.clone(), t.clone(), end);
+            let there = self.carry(x.clone(), t.clone(), end, steps);
             let jet = reverse::implicit_jet(net, there.clone(), t.zeros_like());
-            let (way, to) = (Derivatives::Forward, t.clone());
-            let (steps, method) = (self.share(&t, end), Integrator::Rk4);
+            let (way, to, method) = (Derivatives::Forward, t.clone(), Integrator::Rk4);
             let (v, gradient) = (&self.velocity, jet.gradient);
             transport_gradient(&way, v, there, gradient, from, to, steps, method).1
         };
-        let (g, h) = (self.ends.source(), self.ends.target());
-        between(gradient(g, 0.0), gradient(h, 1.0), t.clone())
+        let [back, ahead] = self.shares(&t);
+        let g = gradient(self.ends.source(), 0.0, back);
+        let h = gradient(self.ends.target(), 1.0, ahead);
+        between(g, h, t.clone())
+    }
+
+    fn carried(&self) -> Option<&dyn Carried<B>> {
+        Some(self)
+    }
+}
+
+impl<B: ModelBackend> Carried<B> for FlowGeometry<B> {
+    fn tolerance(&self) -> f64 {
+        TOLERANCE
+    }
+
+    fn ends(&self, x: Tensor<B, 2>, time: f64) -> Tensor<B, 2> {
+        let t = Tensor::full([x.dims()[0], 1], time, &x.device());
+        let start = self.carry(x.clone(), t.clone(), 0.0, self.share(time));
+        let end = self.carry(x, t, 1.0, self.share(1.0 - time));
+        Tensor::cat(vec![start, end], 1)
+    }
+
+    fn value_from(&self, ends: Tensor<B, 2>, time: f64) -> Tensor<B, 2> {
+        let [n, _] = ends.dims();
+        let (start, end) = (ends.clone().slice([0..n, 0..3]), ends.slice([0..n, 3..6]));
+        let [g, h] = self.end_values(start, end);
+        let t = Tensor::full([n, 1], time, &g.device());
+        between(g, h, t)
     }
 }
 
@@ -215,6 +255,18 @@ mod tests {
         // The tolerance of the integrator times a slope of about one.
         assert_close(host(g), host(wanted_g), 2.0 * TOLERANCE, "g");
         assert_close(host(h), host(wanted_h), 2.0 * TOLERANCE, "h");
+    }
+
+    #[test]
+    fn its_values_come_from_where_points_come_from_and_go_to() {
+        let flow = geometry();
+        for time in [0.0, 0.4, 1.0] {
+            let ends = flow.ends(points(&X), time);
+            let from = flow.value_from(ends, time);
+            let value = flow.value(points(&X), column(&[time; 3]));
+            // The same operations in the same order.
+            assert_close(host(from), host(value), 1e-7, "value");
+        }
     }
 
     #[test]

@@ -54,7 +54,7 @@ pub use flow::FlowGeometry;
 pub use implicit_net::{ImplicitNet, ImplicitNetConfig};
 pub use machine::without_denormals;
 pub use mlp::{Mlp, MlpConfig};
-pub use morph::{Geometry, Motion};
+pub use morph::{Carried, Geometry, Motion};
 pub use objective::{Objective, Term};
 pub use product::product;
 pub use velocity_net::{VelocityNet, VelocityNetConfig};

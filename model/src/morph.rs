@@ -32,6 +32,25 @@ pub trait Geometry<B: ModelBackend>: Sync {
         };
         Tensor::cat(vec![along(0), along(1), along(2)], 1)
     }
+
+    /// The same surface by where its points come from and go to, if that is what it is made of.
+    fn carried(&self) -> Option<&dyn Carried<B>> {
+        None
+    }
+}
+
+/// A surface that a flow carries: `f(x, t)` is known from the positions at times 0 and 1 of what is at `x`
+/// at `t`. These vary more smoothly than `f` does, so they can be interpolated where many values are wanted.
+pub trait Carried<B: ModelBackend>: Sync {
+    /// How far off the true positions may be, in normalised units, for all but one in twenty near the
+    /// surface.
+    fn tolerance(&self) -> f64;
+
+    /// Where points that are at `x` at `time` are at time 0 and at time 1: `[n, 3]` to `[n, 6]`.
+    fn ends(&self, x: Tensor<B, 2>, time: f64) -> Tensor<B, 2>;
+
+    /// `f(x, time)` from what [`Carried::ends`] gives for `x`: `[n, 6]` to `[n, 1]`.
+    fn value_from(&self, ends: Tensor<B, 2>, time: f64) -> Tensor<B, 2>;
 }
 
 /// A map of space from one time to another: it carries points along with the surface.

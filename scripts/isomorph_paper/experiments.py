@@ -119,7 +119,13 @@ SMALL_NETWORKS = (
     "velocity.depth=4",
     "velocity.width=96",
 )
-ROBUST = ("loss.matching-scale=0.1",)
+ROBUST = ("loss.matching-scale=0.03",)
+SOFTPLUS = (
+    "implicit.activation=softplus",
+    "implicit.beta=100",
+    "training.learning-rate=2e-3",
+)
+NO_PRICE = ("loss.screw=0",)
 
 
 def shares(
@@ -137,6 +143,11 @@ def shares(
         )
         for percent in percents
     )
+
+
+def integrator(name: str, steps: int) -> tuple[str, ...]:
+    """The keys that choose how trajectories are integrated."""
+    return (f"training.integrator={name}", f"training.time-steps={steps}")
 
 
 BASELINES = (
@@ -184,7 +195,7 @@ EXPERIMENTS = (
         (FOX_HEAD,),
         (
             *shares("local-swaps", (0, 5, 10, 20), (), "plain distance"),
-            *shares("local-swaps", (0, 20), ROBUST, "Geman-McClure 0.1"),
+            *shares("local-swaps", (0, 20), ROBUST, "Geman-McClure"),
         ),
         "sweep",
         "pairs swapped with their 5th nearest neighbour, %",
@@ -195,7 +206,7 @@ EXPERIMENTS = (
         (FOX_HEAD,),
         (
             *shares("global-swaps", (0, 1, 5, 10), (), "plain distance"),
-            *shares("global-swaps", (0, 1, 5, 10), ROBUST, "Geman-McClure 0.1"),
+            *shares("global-swaps", (0, 1, 5, 10), ROBUST, "Geman-McClure"),
         ),
         "sweep",
         "pairs permuted, %",
@@ -277,6 +288,32 @@ EXPERIMENTS = (
             Row("none known: none sought", keys=("data.correspondences=none",)),
             Row("lipmlp", "lipmlp"),
             Row("nise", "nise"),
+        ),
+    ),
+    Experiment(
+        "ablation",
+        "Each part of the recipe taken out or exchanged: geometry, priors of V, integrators.",
+        (FOX_HEAD, ARMS),
+        (
+            Row("quick", "quick"),
+            Row("quick: seed 1", "quick", ("training.seed=1",)),
+            Row("quick: seed 2", "quick", ("training.seed=2",)),
+            Row("geometry: one network", "quick", NETWORK),
+            Row("geometry: softplus ends", "quick", SOFTPLUS),
+            Row("geometry: no distance", "quick", ("loss.distance=0",)),
+            Row("V: no on-surface", "quick", ("loss.on-surface=0",)),
+            Row("V: stationary", "quick", ("velocity.time-dependent=false", *NO_PRICE)),
+            Row("V: time without a price", "quick", NO_PRICE),
+            Row("V: steadiness for screw", "quick", ("loss.steadiness=10", *NO_PRICE)),
+            Row("V: acceleration for screw", "quick", ("loss.acceleration=10", *NO_PRICE)),
+            Row("V: no strain", "quick", NO_STRAIN),
+            Row("V: strain Huber 0.1", "quick", ("loss.strain-scale=0.1",)),
+            Row("V: deviatoric for strain", "quick", ("loss.deviatoric=3", *NO_STRAIN)),
+            Row("V: stretch for strain", "quick", ("loss.stretch=3", *NO_STRAIN)),
+            Row("V: no divergence", "quick", ("loss.divergence=0",)),
+            Row("steps: Euler 8", "quick", integrator("euler", 8)),
+            Row("steps: midpoint 3", "quick", integrator("midpoint", 3)),
+            Row("steps: RK4 1", "quick", integrator("rk4", 1)),
         ),
     ),
 )

@@ -9,11 +9,17 @@ use isomorph_model::ModelBackend;
 
 use crate::evaluate::{Candidate, Carried, EvaluateError, Evaluation, Mesh, Purpose, Reference};
 use crate::shape::Normalisation;
+use crate::surface::SurfaceMesh;
 use crate::surface::extract::{ExtractError, Grid, GridError};
-use crate::surface::frames::{FramesError, Surface, Trained};
+use crate::surface::frames::FramesError;
+use crate::surface::trained::{Surface, Trained};
 
 /// Cells along the longest side where a surface only serves to find the best times.
 const COARSE: usize = 48;
+
+/// Times, 0 and 1 aside, at which a surface that its motion carries is extracted to find the best times; in
+/// between its vertices are carried from the nearest.
+const ANCHORS: f64 = 16.0;
 
 /// Where and how closely a method is measured.
 pub(super) struct Ruler<'a> {
@@ -33,6 +39,9 @@ struct Measured<'a, B: ModelBackend> {
     truth: Normalisation,
     fine: Grid,
     coarse: Grid,
+    /// The coarse surface extracted last, in the method's coordinates, and its time; no mesh if it had
+    /// vanished.
+    anchor: Option<(f64, Option<SurfaceMesh>)>,
 }
 
 impl<'a, B: ModelBackend> Measured<'a, B> {
@@ -43,7 +52,39 @@ impl<'a, B: ModelBackend> Measured<'a, B> {
             truth: ruler.normalisation,
             fine: grid(ruler.resolution)?,
             coarse: grid(ruler.resolution.min(COARSE))?,
+            anchor: None,
         })
+    }
+
+    /// The zero set of the method's field; `None` where it is empty.
+    fn extracted(&self, grid: &Grid, time: f64) -> Result<Option<SurfaceMesh>, FramesError> {
+        match self.trained.surface_at(grid, time) {
+            Ok(found) => Ok(Some(found.mesh)),
+            // The field has one sign in the whole box: the surface has vanished.
+            Err(FramesError::Extract {
+                reason: ExtractError::NoSurface { .. },
+                ..
+            }) => Ok(None),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// The coarse surface of a time not far from `time`, carried there.
+    fn near_anchor(&mut self, time: f64) -> Result<Option<SurfaceMesh>, FramesError> {
+        let near = (time * ANCHORS).round() / ANCHORS;
+        let known = self.anchor.take().filter(|(at, _)| *at == near);
+        let mesh = match known {
+            Some((_, mesh)) => mesh,
+            None => self.extracted(&self.coarse, near)?,
+        };
+        self.anchor = Some((near, mesh.clone()));
+        let Some(mut mesh) = mesh else {
+            return Ok(None);
+        };
+        if time != near {
+            mesh.vertices = self.trained.carry(&mesh.vertices, near, time)?;
+        }
+        Ok(Some(mesh))
     }
 
     /// From the method's coordinates to those of the truth.
@@ -75,21 +116,16 @@ impl<B: ModelBackend> Candidate for Measured<'_, B> {
         if matches!(self.trained.shape, Surface::Template(_)) {
             return Ok(None);
         }
-        let grid = match purpose {
-            Purpose::Aligning => &self.coarse,
-            Purpose::Measured => &self.fine,
+        let mesh = match purpose {
+            Purpose::Aligning if self.trained.surface_is_carried() => self.near_anchor(time)?,
+            Purpose::Aligning => self.extracted(&self.coarse, time)?,
+            Purpose::Measured => self.extracted(&self.fine, time)?,
         };
-        let mesh = match self.trained.surface_at(grid, time) {
-            Ok(found) => found.mesh,
-            // The field has one sign in the whole box: the surface has vanished.
-            Err(FramesError::Extract {
-                reason: ExtractError::NoSurface { .. },
-                ..
-            }) => return Ok(None),
-            Err(error) => return Err(error),
+        let measured = |mesh: SurfaceMesh| {
+            let vertices = self.measured(mesh.vertices);
+            Mesh::of_points(&vertices, &mesh.triangles)
         };
-        let vertices = self.measured(mesh.vertices);
-        Ok(Some(Mesh::of_points(&vertices, &mesh.triangles)))
+        Ok(mesh.map(measured))
     }
 
     fn carried(

@@ -30,7 +30,7 @@ use crate::surface::write::{SurfaceFormat, SurfaceView, write_surface};
 /// Compare methods on pairs of frames of a sequence, in one table and one figure
 ///
 /// Each method sees the two frames of a pair and 1000 correspondences, and is measured on the frames
-/// between. Presets of ours: quick, default, paper. Others, on the networks and steps of quick: mlp,
+/// between. Presets of ours: quick, default, quality, paper. Others, on the networks and steps of quick: mlp,
 /// sdf-blend, lipmlp, nise, nise-velocity, eigenbasis, nfgp. A pair that is done is not done again: the
 /// command can be interrupted and repeated. Straight lines between all true vertices (linear) and the
 /// sampling floor are in every table.

@@ -52,9 +52,10 @@ pub(super) struct ExtractArgs {
     #[arg(long)]
     carry: bool,
 
-    /// Leave out pieces with less than this share of a surface's area; 0 keeps every piece
-    #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
-    smallest_component: f64,
+    /// Leave out pieces with less than this share of a surface's area; 0 keeps every piece [default: as
+    /// in the recipe]
+    #[arg(long, value_name = "SHARE")]
+    smallest_component: Option<f64>,
 
     /// Folder for the files [default: meshes/ in the run]
     #[arg(long, short, value_name = "DIR")]
@@ -86,11 +87,13 @@ pub(super) fn run(args: ExtractArgs) -> Result<Ending> {
     if let Some(time) = times.iter().find(|time| !(0.0..=1.0).contains(*time)) {
         return Err(Usage(format!("--times: {time}: must be 0 to 1 (0 is the source)")).into());
     }
-    if !(0.0..=1.0).contains(&args.smallest_component) {
-        let found = args.smallest_component;
-        return Err(Usage(format!("--smallest-component: {found}: must be 0 to 1")).into());
+    let mut recipe = checkpoint.recipe()?;
+    if let Some(share) = args.smallest_component {
+        if !(0.0..=1.0).contains(&share) {
+            return Err(Usage(format!("--smallest-component: {share}: must be 0 to 1")).into());
+        }
+        recipe.result.smallest_component = share;
     }
-    let recipe = checkpoint.recipe()?;
     let options = FrameOptions {
         times,
         resolution: args
@@ -101,7 +104,6 @@ pub(super) fn run(args: ExtractArgs) -> Result<Ending> {
             Format::Obj => SurfaceFormat::Obj,
         },
         carry: args.carry.then(|| recipe.data.source.clone()),
-        smallest_component: args.smallest_component,
         folder: args.output.clone().unwrap_or_else(|| run.meshes()),
     };
     let reporter = Reporter::new(&run, Some(usize::MAX), args.quiet.verbosity())?;

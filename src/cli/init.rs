@@ -25,7 +25,7 @@ pub(super) struct InitArgs {
     #[arg(long, value_name = "FILE", default_value = "none")]
     correspondences: String,
 
-    /// The values that keys left out fall back to: quick, default or paper
+    /// The values that keys left out fall back to: quick, default, quality or paper
     #[arg(long, default_value = "default")]
     preset: String,
 }

@@ -9,7 +9,7 @@ use crate::learner::method::{self, Method};
 use crate::recipe::{MethodName, Recipe};
 use crate::shape::{self, Bounds, Normalisation, Pair};
 use crate::surface::SurfaceMesh;
-use crate::surface::frames::{Surface, Trained};
+use crate::surface::trained::{Surface, Trained};
 
 /// The frame of a pair of shapes: where the user's coordinates lie in the networks'.
 #[derive(Clone, Copy, Debug)]
@@ -37,6 +37,7 @@ pub(super) fn trained<B: TrainBackend>(
         motion: method.motion(),
         normalisation: frame.normalisation,
         bounds: frame.bounds.padded(recipe.training.box_margin as f32),
+        smallest_component: recipe.result.smallest_component,
         device,
     })
 }

@@ -17,7 +17,8 @@ use crate::recipe::Recipe;
 use crate::report::{Reporter, picture};
 use crate::run_directory::RunDirectory;
 use crate::shape::Pair;
-use crate::surface::frames::{Frame, FrameOptions, Trained, write_frames};
+use crate::surface::frames::{Frame, FrameOptions, write_frames};
+use crate::surface::trained::Trained;
 use crate::surface::write::SurfaceFormat;
 
 /// One run, from its first step or from a checkpoint.
@@ -80,7 +81,6 @@ impl Task for Train {
             resolution: result.resolution,
             format: SurfaceFormat::Ply,
             carry: None,
-            smallest_component: 0.0,
             folder: run.meshes(),
         };
         write_and_show(&trained, &options, &self.stop, &mut reporter)
@@ -115,6 +115,8 @@ fn extracted(frame: &Frame, options: &FrameOptions) -> Event {
         vertices: frame.mesh.vertices.len(),
         triangles: frame.mesh.triangles.len(),
         components: frame.components,
+        left_out: frame.left_out,
+        consistency: frame.entry.consistency,
         touches_box: frame.touches_box,
     }
 }

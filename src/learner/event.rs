@@ -150,6 +150,11 @@ pub enum Event {
         triangles: usize,
         /// Number of connected components.
         components: usize,
+        /// Components that were too small to be kept.
+        left_out: usize,
+        /// How far it is from the surfaces of both ends carried to its time, in the mean and normalised; none
+        /// where nothing carries them.
+        consistency: Option<f64>,
         /// Whether the box that was searched cuts it off.
         touches_box: bool,
     },

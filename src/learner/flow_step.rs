@@ -52,13 +52,15 @@ impl<B: TrainBackend> FlowStep<'_, B> {
     fn motion_terms(&self, batch: &Batch, objective: &mut Objective<B>) {
         let loss = &self.motion.settings.loss;
         let weight = self.ramp * loss.on_surface;
-        let across: Vec<f32> = match weight > 0.0 {
-            true => batch.starts.times.iter().map(|time| 1.0 - time).collect(),
-            false => Vec::new(),
+        let across: Vec<f32> = if weight > 0.0 {
+            batch.starts.times.iter().map(|time| 1.0 - time).collect()
+        } else {
+            Vec::new()
         };
-        let matching = match self.ramp > 0.0 {
-            true => loss.matching,
-            false => loss.matching_warm_up,
+        let matching = if self.ramp > 0.0 {
+            loss.matching
+        } else {
+            loss.matching_warm_up
         };
         let arrived = self
             .motion

@@ -24,6 +24,8 @@ pub struct Motion<'a, B: TrainBackend> {
     pub sizes: BatchSizes,
     /// The Velocity-Net.
     pub v: &'a VelocityNet<B>,
+    /// The scale of the matching term in this step; 0 is the plain distance.
+    pub matching_scale: f64,
     /// Where tensors live.
     pub device: &'a B::Device,
 }
@@ -83,7 +85,7 @@ impl<B: TrainBackend> Motion<'_, B> {
             objective.add("matching", weight, || {
                 let marks = self.rows(&[&targets[..], sources].concat());
                 let there = arrived.clone().slice([0..2 * matched, 0..3]);
-                matching::matching(there, marks, self.settings.loss.matching_scale)
+                matching::matching(there, marks, self.matching_scale)
             });
         }
         (!stops.is_empty()).then(|| arrived.slice([2 * matched..x.len(), 0..3]))
@@ -94,12 +96,12 @@ impl<B: TrainBackend> Motion<'_, B> {
     pub fn carry_constants(&self, batch: &Batch, normals: bool) -> Still<B> {
         let settings = self.settings;
         let v = self.v.valid();
-        let x = rows::<B::InnerBackend>(&batch.starts.points, self.device);
+        let x = rows::<B::InnerBackend, 3>(&batch.starts.points, self.device);
         let from = column::<B::InnerBackend>(&batch.starts.times, self.device);
         let to = column::<B::InnerBackend>(&batch.stops, self.device);
         let (steps, integrator) = (settings.steps, settings.integrator);
         if normals && has_normals(batch) {
-            let n = rows::<B::InnerBackend>(&batch.starts.normals, self.device);
+            let n = rows::<B::InnerBackend, 3>(&batch.starts.normals, self.device);
             let operators = &settings.derivatives;
             let (positions, n) = transport(operators, &v, x, n, from, to, steps, integrator);
             Still {

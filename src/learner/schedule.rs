@@ -4,6 +4,9 @@
 use crate::learner::event::Phase;
 use crate::recipe::{Schedule as Fall, TrainingRecipe};
 
+/// The first scale of the matching term over the last.
+const FIRST_SCALE: f64 = 10.0;
+
 /// The schedule of a run; all boundaries in steps.
 #[derive(Clone, Debug)]
 pub struct Schedule {
@@ -46,6 +49,15 @@ impl Schedule {
         }
         let span = (self.ramp_until - self.warm_up).max(1) as f64;
         ((step - self.warm_up) as f64 / span).min(1.0)
+    }
+
+    /// The scale beyond which the matching term lets go of a pair: from ten times the last one it falls, each
+    /// step by the same factor, until the ramp ends. While it is large the term is nearly the squared
+    /// distance, which has one minimum; as it shrinks what is then far off counts less and less (graduated
+    /// non-convexity; Blake and Zisserman 1987). 0, which is the plain distance, stays 0.
+    pub fn matching_scale(&self, last: f64, step: usize) -> f64 {
+        let left = self.ramp_until.saturating_sub(step) as f64;
+        last * FIRST_SCALE.powf(left / self.ramp_until.max(1) as f64)
     }
 
     /// The learning rate of the Implicit-Net.
@@ -126,5 +138,25 @@ mod tests {
         close(quick.implicit_rate(300), 2e-3);
         close(quick.implicit_rate(1000), 2e-3 * 0.02);
         assert!((1..1000).all(|step| quick.implicit_rate(step) <= quick.implicit_rate(step - 1)));
+    }
+
+    #[test]
+    fn the_scale_of_the_matching_falls_to_its_last_value_until_the_ramp_ends() {
+        let quick = schedule(Preset::Quick, &["training.ramp-until=0.5"]);
+        let scales = [0, 250, 500, 999].map(|step| quick.matching_scale(0.1, step));
+        // Halfway in ratio is halfway in steps.
+        for (found, wanted) in scales.iter().zip([1.0, 0.1 * 10f64.sqrt(), 0.1, 0.1]) {
+            assert!((found - wanted).abs() < 1e-12, "{scales:?}");
+        }
+        assert_eq!(
+            quick.matching_scale(0.0, 0),
+            0.0,
+            "the plain distance stays it"
+        );
+        let at_once = schedule(
+            Preset::Quick,
+            &["training.ramp-until=0", "training.warm-up=0"],
+        );
+        assert_eq!(at_once.matching_scale(0.1, 0), 0.1);
     }
 }

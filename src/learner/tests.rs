@@ -403,8 +403,9 @@ fn every_method_trains_and_resumes_to_the_same_weights() {
 fn every_method_has_a_surface_or_moves_points() {
     for name in methods() {
         let learner = learner(&[&SMALL[..], &[name.as_str()]].concat());
-        let x =
-            || crate::tensors::rows::<NdArray>(&[[0.3, 0.0, 0.1], [0.0; 3]], &Default::default());
+        let x = || {
+            crate::tensors::rows::<NdArray, 3>(&[[0.3, 0.0, 0.1], [0.0; 3]], &Default::default())
+        };
         let t = burn::tensor::Tensor::full([2, 1], 0.5, &Default::default());
         let geometry = learner.method().geometry();
         let motion = learner.method().motion();

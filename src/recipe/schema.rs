@@ -16,7 +16,7 @@ pub(super) struct Key {
     pub(super) doc: &'static str,
     pub(super) rule: Rule,
     /// TOML for quick, default and paper; `_` where only the user can know.
-    pub(super) columns: [&'static str; 3],
+    pub(super) columns: [&'static str; 4],
 }
 
 impl Key {
@@ -35,10 +35,11 @@ impl Key {
 
     /// The value that a preset gives, as TOML; `None` where the recipe must give one.
     pub(super) fn column(&self, preset: Preset) -> Option<&'static str> {
-        let [quick, default, paper] = self.columns;
+        let [quick, default, quality, paper] = self.columns;
         let text = match preset {
             Preset::Quick => quick,
             Preset::Default => default,
+            Preset::Quality => quality,
             Preset::Paper => paper,
         };
         (text != "_").then_some(text)
@@ -94,7 +95,7 @@ settings! {
         |path: &PathBuf| path.to_string_lossy().into_owned();
 }
 
-/// Declares the recipe: sections of keys, each with its type, its three preset columns and its
+/// Declares the recipe: sections of keys, each with its type, its four preset columns and its
 /// rule. A doc comment becomes both the field's documentation and the comment in the TOML.
 macro_rules! sections {
     ($(
@@ -102,7 +103,7 @@ macro_rules! sections {
         $section:ident: $Section:ident {
             $(
                 $(#[doc = $doc:literal])+
-                $field:ident: $type:ty = $quick:tt | $default:tt | $paper:tt, $rule:expr;
+                $field:ident: $type:ty = $quick:tt | $default:tt | $quality:tt | $paper:tt, $rule:expr;
             )+
         }
     )+) => {
@@ -121,8 +122,9 @@ macro_rules! sections {
                 $(
                     $(#[doc = $doc])+
                     #[doc = concat!(
-                        "\n\nPresets quick | default | paper: `",
-                        stringify!($quick), " | ", stringify!($default), " | ", stringify!($paper),
+                        "\n\nPresets quick | default | quality | paper: `",
+                        stringify!($quick), " | ", stringify!($default), " | ",
+                        stringify!($quality), " | ", stringify!($paper),
                         "`; allowed: `", stringify!($rule), "`."
                     )]
                     pub $field: $type,
@@ -142,7 +144,12 @@ macro_rules! sections {
                 field: stringify!($field),
                 doc: concat!($($doc),+),
                 rule: $rule,
-                columns: [stringify!($quick), stringify!($default), stringify!($paper)],
+                columns: [
+                    stringify!($quick),
+                    stringify!($default),
+                    stringify!($quality),
+                    stringify!($paper),
+                ],
             }, )+ )+
         ];
 

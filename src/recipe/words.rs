@@ -59,6 +59,8 @@ words! {
         Quick = "quick",
         /// The balance of quality and time that the project recommends.
         Default = "default",
+        /// The best that the method gives, for those who can wait.
+        Quality = "quality",
         /// The paper's networks, weights and schedule, with the least corrections that make
         /// them work.
         Paper = "paper",

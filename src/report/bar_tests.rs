@@ -186,6 +186,8 @@ fn surfaces_have_a_bar_of_their_own() {
         vertices: 8,
         triangles: 12,
         components: 1,
+        left_out: 0,
+        consistency: None,
         touches_box: false,
     };
     bar.show(&extracted, now);

@@ -159,18 +159,26 @@ fn extracted(event: &Event) -> Option<String> {
         vertices,
         triangles,
         components,
+        left_out,
+        consistency,
         touches_box,
     } = event
     else {
         return None;
     };
     let mut text = format!(
-        "time {time:.3}: {}, {}, {}: {}",
+        "time {time:.3}: {}, {}, {}",
         counted(*vertices, "vertex"),
         counted(*triangles, "triangle"),
         counted(*components, "component"),
-        path.display()
     );
+    if *left_out > 0 {
+        text += &format!(" ({left_out} small left out)");
+    }
+    if let Some(off) = consistency {
+        text += &format!(", {} off the motion", significant(*off));
+    }
+    text += &format!(": {}", path.display());
     if *triangles == 0 {
         text += "; f has no zero in the box at this time";
     }

@@ -83,20 +83,28 @@ fn the_start_says_what_is_trained_on_what() {
 
 #[test]
 fn an_extraction_says_what_is_wrong_with_the_surface() {
-    let extracted = |triangles, touches_box| Event::Extracted {
+    let extracted = |triangles, left_out, consistency, touches_box| Event::Extracted {
         time: 0.25,
         path: "meshes/a.ply".into(),
         vertices: 1026,
         triangles,
         components: 1,
+        left_out,
+        consistency,
         touches_box,
     };
     assert_eq!(
-        text(extracted(2048, false)),
+        text(extracted(2048, 0, None, false)),
         "time 0.250: 1,026 vertices, 2,048 triangles, 1 component: meshes/a.ply"
     );
-    assert!(text(extracted(0, false)).ends_with("; f has no zero in the box at this time"));
-    assert!(text(extracted(2048, true)).ends_with("larger training.box-margin"));
+    assert_eq!(
+        text(extracted(2048, 2, Some(0.00123), false)),
+        "time 0.250: 1,026 vertices, 2,048 triangles, 1 component (2 small left out), 0.00123 off the motion: meshes/a.ply"
+    );
+    assert!(
+        text(extracted(0, 0, None, false)).ends_with("; f has no zero in the box at this time")
+    );
+    assert!(text(extracted(2048, 0, None, true)).ends_with("larger training.box-margin"));
 }
 
 #[test]

@@ -11,9 +11,9 @@ const HOST_CHUNK: usize = 1024;
 const DEVICE_CHUNK: usize = 1 << 16;
 
 /// What `map` makes of each chunk of the points, in their order.
-pub(super) fn in_chunks<B: ModelBackend, T: Send>(
-    points: &[[f32; 3]],
-    map: impl Fn(&[[f32; 3]]) -> T + Sync,
+pub(super) fn in_chunks<B: ModelBackend, P: Sync, T: Send>(
+    points: &[P],
+    map: impl Fn(&[P]) -> T + Sync,
 ) -> Vec<T> {
     if B::POINTS_AT_A_TIME.is_none() {
         return points.chunks(DEVICE_CHUNK).map(map).collect();

@@ -39,20 +39,18 @@ impl SurfaceMesh {
         pieces
     }
 
-    /// The `count` pieces of largest area.
+    /// The pieces that have at least `share` of the whole area, and how many there were; 0 keeps all, more
+    /// than 1 none.
     #[must_use]
-    pub fn keep_largest(&self, count: usize) -> Self {
-        let pieces = self.components();
-        self.only(&pieces[..count.min(pieces.len())])
-    }
-
-    /// The pieces that have at least `share` of the whole area; 0 keeps all, more than 1 none.
-    #[must_use]
-    pub fn keep_at_least(&self, share: f64) -> Self {
+    pub fn keep_at_least(self, share: f64) -> (Self, usize) {
         let mut pieces = self.components();
+        let all = pieces.len();
         let least = share * pieces.iter().map(|piece| piece.area).sum::<f64>();
         pieces.retain(|piece| piece.area >= least);
-        self.only(&pieces)
+        if pieces.len() == all {
+            return (self, all);
+        }
+        (self.only(&pieces), all)
     }
 
     /// The mesh of some of its pieces, without vertices that no triangle uses; the order of
@@ -131,26 +129,23 @@ mod tests {
     #[test]
     fn filters_keep_order_and_normals_and_drop_unused_vertices() {
         let mesh = scattered(&[1.0, 3.0, 2.0]);
-        let kept = mesh.keep_largest(2);
+        // Areas 0.5, 4.5 and 2 of 7 in all.
+        let (kept, all) = mesh.clone().keep_at_least(0.25);
+        assert_eq!(all, 3);
         assert_eq!(kept.triangles, [[0, 1, 2], [3, 4, 5]]);
         assert_eq!(kept.vertices, mesh.vertices[4..]);
         assert_eq!(
             kept.normals.as_deref(),
             mesh.normals.as_ref().map(|normals| &normals[4..])
         );
-        // Areas 0.5, 4.5 and 2 of 7 in all.
-        assert_eq!(mesh.keep_at_least(0.25), kept);
-        assert_eq!(mesh.keep_at_least(0.0).triangles.len(), 3);
-        assert!(mesh.keep_at_least(1.1).triangles.is_empty());
-        assert_eq!(mesh.keep_largest(9).triangles.len(), 3);
+        assert_eq!(mesh.clone().keep_at_least(0.0), (mesh.clone(), 3));
+        assert!(mesh.keep_at_least(1.1).0.triangles.is_empty());
     }
 
     #[test]
     fn an_empty_mesh_has_no_pieces() {
         assert!(SurfaceMesh::default().components().is_empty());
-        assert_eq!(
-            SurfaceMesh::default().keep_largest(1),
-            SurfaceMesh::default()
-        );
+        let (kept, all) = SurfaceMesh::default().keep_at_least(0.1);
+        assert_eq!((kept, all), (SurfaceMesh::default(), 0));
     }
 }

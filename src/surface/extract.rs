@@ -126,6 +126,11 @@ impl Grid {
         self.cells.iter().map(|&cells| cells as usize + 1).product()
     }
 
+    /// How far a point is from the lower corner, in cells.
+    pub(super) fn cells_from_corner(&self, x: [f32; 3]) -> [f64; 3] {
+        std::array::from_fn(|axis| (f64::from(x[axis]) - self.min[axis]) / self.spacing)
+    }
+
     /// Where a place given in cells from the lower corner lies.
     pub(super) fn position(&self, place: [f64; 3]) -> [f32; 3] {
         std::array::from_fn(|axis| (self.min[axis] + self.spacing * place[axis]) as f32)

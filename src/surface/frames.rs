@@ -2,47 +2,23 @@
 //! `grad f`, and the input mesh's own vertices carried along `V`.
 //!
 //! Everything is written in the user's coordinates. `frames.json` lists the files:
-//! `[{"time": t, "surface": "surface-000.ply", "slope_error": 0.02, "carried": "carried-000.ply"}, …]`.
+//! `[{"time": t, "surface": "surface-000.ply", "slope_error": 0.02, "consistency": 0.001,
+//! "round_trip": 1e-7, "carried": "carried-000.ply"}, …]`.
 
 use std::convert::Infallible;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use burn::tensor::{Tensor, backend::Backend};
-use isomorph_model::operators::length;
-use isomorph_model::{Geometry, ModelBackend, Motion};
+use isomorph_model::ModelBackend;
 use serde::{Deserialize, Serialize};
 
 use super::SurfaceMesh;
 use super::carry::{CarryError, rewrite_vertices};
-use super::chunks::in_chunks;
-use super::extract::{ExtractError, Grid, GridError, extract};
+use super::extract::{ExtractError, Grid, GridError};
+use super::trained::{Found, Trained};
 use super::write::{SurfaceFormat, SurfaceView, WriteError, write_surface};
 use crate::atomic::write_atomically;
-use crate::shape::{self, Bounds, Normalisation, ShapeError};
-use crate::tensors::{host, rows};
-
-/// What was trained and the frame that it lives in.
-pub struct Trained<B: Backend> {
-    /// What gives the surface.
-    pub shape: Surface<B>,
-    /// What moves points, if the method has it.
-    pub motion: Option<Box<dyn Motion<B>>>,
-    /// From the user's coordinates to the networks'.
-    pub normalisation: Normalisation,
-    /// The box in which the surface is looked for, normalised.
-    pub bounds: Bounds,
-    /// Where tensors live.
-    pub device: B::Device,
-}
-
-/// Where the surface of a time comes from.
-pub enum Surface<B: Backend> {
-    /// The zero set of a field.
-    Field(Box<dyn Geometry<B>>),
-    /// A mesh at time 0, normalised, that the motion carries: of methods that have no field.
-    Template(SurfaceMesh),
-}
+use crate::shape::{self, ShapeError};
 
 /// What to write.
 #[derive(Clone, Debug, PartialEq)]
@@ -55,8 +31,6 @@ pub struct FrameOptions {
     pub format: SurfaceFormat,
     /// The mesh or cloud whose vertices are carried too, if any.
     pub carry: Option<PathBuf>,
-    /// Pieces with less than this share of a surface's area are left out; 0 keeps all.
-    pub smallest_component: f64,
     /// The folder that the files go to.
     pub folder: PathBuf,
 }
@@ -72,6 +46,14 @@ pub struct FrameEntry {
     /// none where the surface is not the zero set of a field.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub slope_error: Option<f64>,
+    /// The mean distance from this surface, carried to either end, to the surface there, normalised: 0
+    /// where surface and motion say the same; none without a field or a motion.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub consistency: Option<f64>,
+    /// The mean distance by which points of it miss themselves that are carried to either end and back,
+    /// normalised.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub round_trip: Option<f64>,
     /// The carried mesh's file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub carried: Option<String>,
@@ -96,6 +78,8 @@ pub struct Frame {
     pub mesh: SurfaceMesh,
     /// Connected pieces.
     pub components: usize,
+    /// Pieces that were too small to be kept.
+    pub left_out: usize,
     /// Whether it reaches the box, and so may be open there.
     pub touches_box: bool,
     /// The share of the grid's nodes at which f was evaluated.
@@ -178,7 +162,7 @@ pub fn write_frames<B: ModelBackend>(
     Ok(frames)
 }
 
-fn no_motion() -> FramesError {
+pub(super) fn no_motion() -> FramesError {
     let text = "this method gives a surface and moves no points: leave --carry out";
     FramesError::NoMotion(text.to_owned())
 }
@@ -206,13 +190,12 @@ fn write_frame<B: ModelBackend>(
     let time = options.times[k];
     let surface = format!("surface-{k:03}.{}", options.format.extension());
     let Found {
-        mut mesh,
+        mesh,
+        components,
+        left_out,
         touches_box,
         evaluated,
     } = trained.surface_at(grid, time)?;
-    if options.smallest_component > 0.0 {
-        mesh = mesh.keep_at_least(options.smallest_component);
-    }
     let (normals, slope_error) = trained.normals(&mesh, time);
     let vertices = mesh
         .vertices
@@ -224,126 +207,23 @@ fn write_frame<B: ModelBackend>(
         normals: Some(&normals),
     };
     write_surface(view, &options.folder.join(&surface), options.format)?;
+    let agreement = trained.agreement(&mesh.vertices, time)?;
     let entry = FrameEntry {
         time,
         surface,
         slope_error,
+        consistency: agreement.map(|found| found.consistency),
+        round_trip: agreement.map(|found| found.round_trip),
         carried,
     };
-    let components = mesh.components().len();
     Ok(Frame {
         entry,
         mesh,
         components,
+        left_out,
         touches_box,
         evaluated,
     })
-}
-
-/// A surface found at a time.
-#[derive(Clone, Debug)]
-pub struct Found {
-    /// In normalised coordinates.
-    pub mesh: SurfaceMesh,
-    /// Whether the box cuts it off.
-    pub touches_box: bool,
-    /// The share of the grid's nodes at which the field was evaluated.
-    pub evaluated: f64,
-}
-
-impl<B: ModelBackend> Trained<B> {
-    /// The surface at a time.
-    ///
-    /// # Errors
-    /// [`FramesError`] if the field is not finite there, or has too many cells; [`FramesError::NoMotion`].
-    pub fn surface_at(&self, grid: &Grid, time: f64) -> Result<Found, FramesError> {
-        let geometry = match &self.shape {
-            Surface::Field(geometry) => geometry,
-            Surface::Template(mesh) => {
-                let mut mesh = mesh.clone();
-                mesh.vertices = self.path(&mesh.vertices, &[time])?.remove(0);
-                return Ok(Found {
-                    mesh,
-                    touches_box: false,
-                    evaluated: 0.0,
-                });
-            }
-        };
-        let field = |points: &[[f32; 3]]| {
-            let values = in_chunks::<B, _>(points, |chunk| {
-                let t = Tensor::full([chunk.len(), 1], time, &self.device);
-                host(geometry.value(rows(chunk, &self.device), t))
-            });
-            Ok::<_, Infallible>(values.concat())
-        };
-        let found = extract(field, grid).map_err(|reason| FramesError::Extract { time, reason })?;
-        Ok(Found {
-            mesh: found.mesh,
-            touches_box: found.touches_box,
-            evaluated: found.evaluated as f64 / found.grid_points as f64,
-        })
-    }
-
-    /// Unit normals of a surface, and the mean of `||grad f| - 1|` over its vertices where it is the zero
-    /// set of a field `f`.
-    fn normals(&self, mesh: &SurfaceMesh, time: f64) -> (Vec<[f32; 3]>, Option<f64>) {
-        let Some(gradients) = self.gradients(&mesh.vertices, time) else {
-            return (mesh.area_weighted_normals(), None);
-        };
-        let mut normals = Vec::with_capacity(gradients.len());
-        let mut off = 0.0;
-        for [x, y, z, slope] in &gradients {
-            normals.push([x / slope, y / slope, z / slope]);
-            off += (f64::from(*slope) - 1.0).abs();
-        }
-        (normals, Some(off / gradients.len().max(1) as f64))
-    }
-
-    /// The mean of `||grad f| - 1|` at points, normalised; `None` without a field.
-    pub fn slope_error(&self, points: &[[f32; 3]], time: f64) -> Option<f64> {
-        let gradients = self.gradients(points, time)?;
-        let off: f64 = gradients
-            .iter()
-            .map(|[_, _, _, slope]| (f64::from(*slope) - 1.0).abs())
-            .sum();
-        Some(off / gradients.len().max(1) as f64)
-    }
-
-    /// `grad f` and its length at points.
-    fn gradients(&self, points: &[[f32; 3]], time: f64) -> Option<Vec<[f32; 4]>> {
-        let Surface::Field(geometry) = &self.shape else {
-            return None;
-        };
-        let pieces = in_chunks::<B, _>(points, |chunk| {
-            let t = Tensor::full([chunk.len(), 1], time, &self.device);
-            let gradient = geometry.gradient(rows(chunk, &self.device), t);
-            host(Tensor::cat(vec![gradient.clone(), length(gradient)], 1))
-        });
-        Some(pieces.concat().as_chunks::<4>().0.to_vec())
-    }
-
-    /// Positions at ascending times of points that are at `start` at time 0, normalised.
-    ///
-    /// # Errors
-    /// [`FramesError::NoMotion`] if the method moves no points.
-    pub fn path(
-        &self,
-        start: &[[f32; 3]],
-        times: &[f64],
-    ) -> Result<Vec<Vec<[f32; 3]>>, FramesError> {
-        let motion = self.motion.as_ref().ok_or_else(no_motion)?;
-        let pieces = in_chunks::<B, _>(start, |chunk| {
-            let positions = motion.path(rows(chunk, &self.device), times);
-            positions.into_iter().map(host).collect::<Vec<_>>()
-        });
-        let mut path = vec![Vec::with_capacity(start.len()); times.len()];
-        for piece in pieces {
-            for (whole, part) in path.iter_mut().zip(piece) {
-                whole.extend_from_slice(part.as_chunks::<3>().0);
-            }
-        }
-        Ok(path)
-    }
 }
 
 /// Carries the vertices of a shape through all times and writes a file for each; their names.

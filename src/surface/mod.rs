@@ -8,22 +8,29 @@
 //! | `cell.rs` | the closed loops in which a surface crosses one cell, and their triangles |
 //! | `polygonise.rs` | cells joined into one mesh with shared vertices |
 //! | `components.rs` | connected pieces and filters that drop the small ones |
+//! | `flow_map.rs` | a field that a flow carries, the flow followed at few points |
 //! | `chunks.rs` | networks at many points, on all cores |
+//! | `agreement.rs` | whether a method's surfaces and its motion say the same |
+//! | `trained.rs` | a trained method: its surface at a time, where its motion takes points |
+//! | `frames.rs` | the surfaces of chosen times, as files |
 //! | `carry.rs` | the input file again, its vertices moved |
 //! | `write.rs` | PLY and OBJ files |
 //!
 //! A field is negative inside; triangles wind counter-clockwise seen from outside, so normals
 //! point outwards and the volume of a closed surface is positive.
 
+mod agreement;
 pub mod carry;
 mod cell;
 mod chunks;
 pub mod components;
 pub mod extract;
+mod flow_map;
 pub mod frames;
 mod lattice;
 mod polygonise;
 mod search;
+pub mod trained;
 pub mod write;
 
 /// Triangles over shared vertices.

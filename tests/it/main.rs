@@ -15,5 +15,6 @@ mod information;
 mod matching;
 mod methods;
 mod outputs;
+mod paper;
 mod resume;
 mod support;

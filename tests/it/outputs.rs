@@ -88,7 +88,13 @@ fn the_json_of_a_run_has_the_fields_that_are_documented_and_no_others() {
     {
         assert_eq!(
             keys(entry),
-            BTreeSet::from(["slope_error", "surface", "time"])
+            BTreeSet::from([
+                "consistency",
+                "round_trip",
+                "slope_error",
+                "surface",
+                "time"
+            ])
         );
     }
     let state = [

@@ -90,6 +90,9 @@ impl<B: TrainBackend> Method<B> for Flow<B> {
                 settings,
                 sizes: sizes.part(part.of),
                 v: &v,
+                matching_scale: self
+                    .schedule
+                    .matching_scale(settings.loss.matching_scale, step),
                 device,
             },
             phase: self.phase(step),

@@ -69,6 +69,9 @@ impl<B: TrainBackend> Method<B> for VelocityField<B> {
                 settings: &self.settings,
                 sizes: sizes.part(part.of),
                 v: &v,
+                matching_scale: self
+                    .schedule
+                    .matching_scale(self.settings.loss.matching_scale, step),
                 device: &self.device,
             },
             phase: self.schedule.phase(step),

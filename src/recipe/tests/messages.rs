@@ -29,7 +29,7 @@ data.source = ""
 data.correspondences = 'same'
     data.correspondences = 'same': must be "none", "same-vertices", "match" or the path of a file (folder/name.extension)
 preset = 'fast'
-    preset = 'fast': must be "quick", "default" or "paper"
+    preset = 'fast': must be "quick", "default", "quality" or "paper"
 loss = 5
     loss = 5: must be a section: [loss] on a line of its own, once
 checkpoint.evry = 5
@@ -37,9 +37,9 @@ checkpoint.evry = 5
 checkpoint."ev\u001bry" = 5
     checkpoint.ev�ry: no such key; did you mean every? ([checkpoint] has every, keep)
 result.steps = 5
-    result.steps: no such key; it belongs in [training] ([result] has frames, resolution)
+    result.steps: no such key; it belongs in [training] ([result] has frames, resolution, smallest-component)
 result.zzz = 5
-    result.zzz: no such key ([result] has frames, resolution)
+    result.zzz: no such key ([result] has frames, resolution, smallest-component)
 steps = 5
     steps: no such key; it belongs in [training] (above all sections stands preset)
 preste = 'quick'
@@ -138,7 +138,7 @@ fn overrides_win_in_their_order_and_name_themselves_when_refused() {
         ),
         (
             "result.frame=5",
-            "no such key; did you mean frames? ([result] has frames, resolution)",
+            "no such key; did you mean frames? ([result] has frames, resolution, smallest-component)",
         ),
         (
             "results.frames=5",

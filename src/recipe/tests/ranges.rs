@@ -77,6 +77,7 @@ checkpoint.every               1       0        10000000 10000001
 checkpoint.keep                1       0        10000000 10000001
 result.frames                  0       -1       1000     1001
 result.resolution              8       7        1024     1025
+result.smallest-component      0       -1e-9    1        1.001
 "#;
 
 /// Values under which every single key may take either end of its range.

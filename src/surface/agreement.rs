@@ -1,0 +1,171 @@
+//! Whether a method's surfaces and its motion say the same of the shape.
+
+use burn::tensor::Tensor;
+use isomorph_model::{Geometry, ModelBackend};
+
+use super::frames::FramesError;
+use super::trained::{Surface, Trained};
+use crate::tensors::{host, rows};
+
+/// The most vertices of a surface that are looked at.
+const LOOKED_AT: usize = 1000;
+
+/// How the surface of one time and the motion agree; lengths in normalised units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Agreement {
+    /// The mean of `|f(phi_{t -> s}(x), s)|` over points `x` of the surface at `t`, for `s` 0 and 1: how far
+    /// the surface is from those of the ends carried to its time, 0 where the motion carries one onto the
+    /// other. Only as far as `f` is a distance.
+    pub consistency: f64,
+    /// The mean distance of those points from where they come back to from `s`: the integrator's error.
+    pub round_trip: f64,
+}
+
+impl<B: ModelBackend> Trained<B> {
+    /// Of the surface at `time`, whose vertices these are; `None` where the method has no field or moves no
+    /// points, or the surface is empty.
+    pub(super) fn agreement(
+        &self,
+        vertices: &[[f32; 3]],
+        time: f64,
+    ) -> Result<Option<Agreement>, FramesError> {
+        let Surface::Field(geometry) = &self.shape else {
+            return Ok(None);
+        };
+        if self.motion.is_none() || vertices.is_empty() {
+            return Ok(None);
+        }
+        let apart = vertices.len().div_ceil(LOOKED_AT);
+        let start: Vec<[f32; 3]> = vertices.iter().step_by(apart).copied().collect();
+        let (mut off, mut missed) = (0.0, 0.0);
+        for end in [0.0, 1.0] {
+            let there = self.carry(&start, time, end)?;
+            off += self.mean_distance(geometry.as_ref(), &there, end);
+            let back = self.carry(&there, end, time)?;
+            let apart = |(a, b): (&[f32; 3], &[f32; 3])| {
+                let squares = a.iter().zip(b).map(|(a, b)| f64::from(a - b).powi(2));
+                squares.sum::<f64>().sqrt()
+            };
+            missed += start.iter().zip(&back).map(apart).sum::<f64>();
+        }
+        let count = 2.0 * start.len() as f64;
+        Ok(Some(Agreement {
+            consistency: off / 2.0,
+            round_trip: missed / count,
+        }))
+    }
+
+    /// The mean of `|f(., time)|`.
+    fn mean_distance(&self, geometry: &dyn Geometry<B>, points: &[[f32; 3]], time: f64) -> f64 {
+        let t = Tensor::full([points.len(), 1], time, &self.device);
+        let values = host(geometry.value(rows(points, &self.device), t));
+        let sum: f64 = values.iter().map(|value| f64::from(value.abs())).sum();
+        sum / points.len() as f64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use burn_ndarray::NdArray;
+    use isomorph_model::Motion;
+
+    use super::*;
+    use crate::shape::{Bounds, Normalisation};
+
+    type Points = Tensor<NdArray, 2>;
+
+    /// A ball of radius 0.4 about `(speed t, 0, 0)`.
+    struct Ball {
+        speed: f64,
+    }
+
+    impl Ball {
+        fn centre(&self, t: Points) -> Points {
+            let none = t.zeros_like();
+            Tensor::cat(vec![t * self.speed, none.clone(), none], 1)
+        }
+    }
+
+    impl Geometry<NdArray> for Ball {
+        fn value(&self, x: Points, t: Points) -> Points {
+            let from = x - self.centre(t);
+            from.square().sum_dim(1).sqrt() - 0.4
+        }
+    }
+
+    /// To the right at 0.2, and on the way back at 0.2 + `more`.
+    struct Right {
+        more: f64,
+    }
+
+    impl Motion<NdArray> for Right {
+        fn carry(&self, x: Points, from: f64, to: f64) -> Points {
+            let speed = if to < from { 0.2 + self.more } else { 0.2 };
+            let by =
+                Tensor::<NdArray, 1>::from_floats([speed * (to - from), 0.0, 0.0], &x.device());
+            x + by.unsqueeze()
+        }
+    }
+
+    fn agreement(speed: f64, more: f64) -> Agreement {
+        let trained = Trained::<NdArray> {
+            shape: Surface::Field(Box::new(Ball { speed })),
+            motion: Some(Box::new(Right { more })),
+            normalisation: Normalisation {
+                centre: [0.0; 3],
+                scale: 1.0,
+            },
+            bounds: Bounds {
+                min: [-1.0; 3],
+                max: [1.0; 3],
+            },
+            smallest_component: 0.0,
+            device: Default::default(),
+        };
+        // The two poles along the motion, where a shift is a distance.
+        let at = |x: f64| [(speed * 0.5 + x) as f32, 0.0, 0.0];
+        let found = trained.agreement(&[at(-0.4), at(0.4)], 0.5);
+        found.expect("it moves points").expect("it has a field")
+    }
+
+    #[test]
+    fn a_surface_that_its_motion_carries_agrees_and_another_is_off_by_the_difference() {
+        let same = agreement(0.2, 0.0);
+        // f32 rounding of positions below 1.
+        assert!(
+            same.consistency < 1e-6 && same.round_trip < 1e-6,
+            "{same:?}"
+        );
+        let faster = agreement(0.5, 0.0);
+        // Half of the time at a difference of 0.3, to each end.
+        assert!((faster.consistency - 0.15).abs() < 1e-6, "{faster:?}");
+        assert!(faster.round_trip < 1e-6, "{faster:?}");
+    }
+
+    #[test]
+    fn a_motion_that_is_not_its_own_inverse_shows_in_the_round_trip() {
+        let found = agreement(0.2, 0.1);
+        // Half of the time at 0.1 more on the way to 0, and on the way back from 1.
+        assert!((found.round_trip - 0.05).abs() < 1e-6, "{found:?}");
+    }
+
+    #[test]
+    fn without_a_motion_nothing_is_said() {
+        let trained = Trained::<NdArray> {
+            shape: Surface::Field(Box::new(Ball { speed: 0.0 })),
+            motion: None,
+            normalisation: Normalisation {
+                centre: [0.0; 3],
+                scale: 1.0,
+            },
+            bounds: Bounds {
+                min: [-1.0; 3],
+                max: [1.0; 3],
+            },
+            smallest_component: 0.0,
+            device: Default::default(),
+        };
+        let found = trained.agreement(&[[0.4, 0.0, 0.0]], 0.0);
+        assert_eq!(found.expect("nothing fails"), None);
+    }
+}
