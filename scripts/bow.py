@@ -1,0 +1,137 @@
+#!/usr/bin/env python3
+"""How the true paths of vertices leave the straight lines between their ends, and how a run's do.
+
+    python3 scripts/bow.py SEQUENCE.anime FROM TO RUN [--binary PATH]
+
+Two frames say nothing of how fast each vertex goes in between, and a motion that bends limbs as little as
+possible may bow to the other side than the true one does: a paw that is lifted on its way bows up, a leg
+that swings without bending at the knee bows down. This prints, for each frame between, in normalised units
+(mean area of the ends 1), root mean squares over the vertices:
+
+    along   the difference of the truth from the straight line, in the direction of that line: timing
+    across  the same, at right angles to it: the bow
+    ours    both of the run, from the truth
+    cosine  between the run's bow and the true one, over the vertices that move by more than .08;
+            1: to the same side, -1: to the other
+
+RUN is a run of `isomorph compare` on that pair (runs/compare/NAME/FROM-TO/METHOD). Needs numpy.
+"""
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from gallery import read_ply
+from isomorph_paper import PaperError
+from isomorph_paper.sequences import Sequence, area, read_sequence
+
+# Vertices that move by less have no direction worth the name.
+MOVES = 0.08
+
+
+@dataclass(frozen=True)
+class Bow:
+    """Of one frame: root mean squares over the vertices, and the cosine."""
+
+    along: float
+    across: float
+    ours_along: float
+    ours_across: float
+    cosine: float
+
+
+def parts(vectors: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The parts of vectors in these unit directions and at right angles to them."""
+    along = (vectors * directions).sum(axis=1, keepdims=True) * directions
+    return along, vectors - along
+
+
+def rms(vectors: np.ndarray) -> float:
+    return float(np.sqrt((vectors**2).sum(axis=1).mean()))
+
+
+def bow(ends: tuple[np.ndarray, np.ndarray], time: float, truth: np.ndarray, run: np.ndarray) -> Bow:
+    """How `truth` and `run`, positions at `time`, leave the lines between the ends; (vertices, 3) each."""
+    start, end = ends
+    way = end - start
+    length = np.linalg.norm(way, axis=1)
+    directions = way / np.maximum(length, 1e-300)[:, None]
+    line = start + time * way
+    along, across = parts(truth - line, directions)
+    ours_along, ours_across = parts(run - truth, directions)
+    moved = length > MOVES
+    _, bent = parts(run - line, directions)
+    inner = (bent[moved] * across[moved]).sum()
+    norms = np.linalg.norm(bent[moved]) * np.linalg.norm(across[moved])
+    cosine = float(inner / norms) if norms > 0 else float("nan")
+    return Bow(rms(along), rms(across), rms(ours_along), rms(ours_across), cosine)
+
+
+def carried(binary: str, run: Path, times: list[float]) -> list[np.ndarray]:
+    """The source's vertices at the times, in the units of the sequence."""
+    with tempfile.TemporaryDirectory() as folder:
+        words = [binary, "extract", str(run), "--times", ",".join(f"{time:.6f}" for time in times)]
+        words += ["--resolution", "32", "--carry", "--quiet", "-o", folder]
+        try:
+            subprocess.run(words, check=True, stdout=subprocess.DEVNULL)
+        except (OSError, subprocess.CalledProcessError) as reason:
+            raise PaperError(f"{binary} extract: failed ({reason})") from reason
+        entries = json.loads((Path(folder) / "frames.json").read_text())
+        if not all(entry["carried"].endswith(".ply") for entry in entries):
+            raise PaperError(f"{run}: its source is not a PLY, as those of `isomorph compare` are")
+        return [read_ply(Path(folder) / entry["carried"])[0] for entry in entries]
+
+
+def bows(sequence: Sequence, pair: tuple[int, int], paths: list[np.ndarray]) -> list[Bow]:
+    """Of every frame strictly between; `paths` are the run's vertices at their times."""
+    first, last = pair
+    ends = [sequence.frames[frame] for frame in pair]
+    scale = (sum(area(end, sequence.triangles) for end in ends) / 2) ** -0.5
+    found = []
+    for frame, run in zip(range(first + 1, last), paths, strict=True):
+        if len(run) != len(ends[0]):
+            raise PaperError(f"the run carries {len(run)} vertices, the sequence has {len(ends[0])}")
+        time = (frame - first) / (last - first)
+        start, end, truth, run = (each * scale for each in (*ends, sequence.frames[frame], run))
+        found.append(bow((start, end), time, truth, run))
+    return found
+
+
+def main(words: list[str]) -> int:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("sequence", type=Path)
+    parser.add_argument("pair", type=int, nargs=2, metavar=("FROM", "TO"))
+    parser.add_argument("run", type=Path)
+    parser.add_argument("--binary", default="isomorph")
+    given = parser.parse_args(words)
+    first, last = given.pair
+    try:
+        sequence = read_sequence(given.sequence)
+        if not 0 <= first < last - 1 < len(sequence.frames) - 1:
+            most = len(sequence.frames) - 1
+            raise PaperError(f"{first} {last}: must be frames of 0 to {most}, with some between")
+        times = [(frame - first) / (last - first) for frame in range(first + 1, last)]
+        found = bows(sequence, (first, last), carried(given.binary, given.run, times))
+    except PaperError as error:
+        print(f"bow.py: {error}", file=sys.stderr)
+        return 1
+    print("frame  along  across  ours: along  across  cosine")
+    row = "{:>5}  {:.4f} {:.4f}        {:.4f} {:.4f}  {:6.2f}"
+    for frame, one in zip(range(first + 1, last), found, strict=True):
+        values = (one.along, one.across, one.ours_along, one.ours_across, one.cosine)
+        print(row.format(frame, *values))
+    table = np.array([[o.along, o.across, o.ours_along, o.ours_across, o.cosine] for o in found])
+    print(row.format("mean", *table.mean(axis=0)))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

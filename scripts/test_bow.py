@@ -1,0 +1,76 @@
+"""Tests of bow.py; they need no isomorph."""
+
+import contextlib
+import io
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+import bow
+from isomorph_paper.sequences import Sequence, write_sequence
+from test_degrade import sphere
+
+
+def turned(points: np.ndarray, angle: float) -> np.ndarray:
+    c, s = np.cos(angle), np.sin(angle)
+    return points @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
+
+
+class Bows(unittest.TestCase):
+    def setUp(self):
+        self.start = np.array([[1.0, 0, 0], [2.0, 0, 1]])
+        self.ends = (self.start, turned(self.start, 1.0))
+        self.middle = turned(self.start, 0.5)
+
+    def test_an_arc_bows_across_its_chord_by_the_sagitta(self):
+        found = bow.bow(self.ends, 0.5, self.middle, self.middle)
+        sagitta = 1 - np.cos(0.5)
+        self.assertAlmostEqual(found.across, sagitta * np.sqrt((1 + 4) / 2))
+        self.assertAlmostEqual(found.along, 0)
+        self.assertAlmostEqual(found.ours_across, 0)
+        self.assertAlmostEqual(found.cosine, 1)
+
+    def test_the_other_side_is_minus_one_and_the_error_twice_the_bow(self):
+        line = sum(self.ends) / 2
+        found = bow.bow(self.ends, 0.5, self.middle, 2 * line - self.middle)
+        self.assertAlmostEqual(found.cosine, -1)
+        self.assertAlmostEqual(found.ours_across, 2 * found.across)
+
+    def test_a_vertex_ahead_of_its_time_is_off_along_its_line(self):
+        start, end = self.ends
+        found = bow.bow(self.ends, 0.5, 0.25 * start + 0.75 * end, sum(self.ends) / 2)
+        way = np.linalg.norm(end - start, axis=1)
+        self.assertAlmostEqual(found.along, 0.25 * np.sqrt((way**2).mean()))
+        self.assertAlmostEqual(found.across, 0)
+
+
+class Sequences(unittest.TestCase):
+    def test_the_numbers_are_in_units_of_mean_area_one(self):
+        vertices, triangles = sphere(8)
+        frames = np.stack([turned(7.0 * vertices, angle) for angle in (0, 0.5, 1.0)])
+        sequence = Sequence(Path("s"), frames, triangles)
+        (found,) = bow.bows(sequence, (0, 2), [frames[1]])
+        reach = np.sqrt((vertices[:, :2] ** 2).sum(axis=1).mean())
+        area = bow.area(vertices, triangles)
+        self.assertAlmostEqual(found.across, (1 - np.cos(0.5)) * reach / np.sqrt(area))
+
+    def test_bad_frames_and_other_vertices_are_one_line(self):
+        vertices, triangles = sphere(8)
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "s.anime"
+            sequence = write_sequence(path, np.stack([vertices] * 3), triangles)
+            errors = io.StringIO()
+            with contextlib.redirect_stderr(errors):
+                self.assertEqual(bow.main([str(path), "0", "3", "run"]), 1)
+            self.assertIn("must be frames of 0 to 2", errors.getvalue())
+            with self.assertRaisesRegex(bow.PaperError, "carries 5 vertices"):
+                bow.bows(sequence, (0, 2), [vertices[:5]])
+
+
+if __name__ == "__main__":
+    unittest.main()
