@@ -14,7 +14,8 @@ that swings without bending at the knee bows down. This prints, for each frame b
     cosine  between the run's bow and the true one, over the vertices that move by more than .08;
             1: to the same side, -1: to the other
 
-RUN is a run of `isomorph compare` on that pair (runs/compare/NAME/FROM-TO/METHOD). Needs numpy.
+RUN is a run on that pair whose source has the sequence's vertices, such as those that `isomorph compare`
+leaves in runs/compare/NAME/FROM-TO/METHOD. Needs numpy.
 """
 
 import argparse
@@ -73,6 +74,14 @@ def bow(ends: tuple[np.ndarray, np.ndarray], time: float, truth: np.ndarray, run
     return Bow(rms(along), rms(across), rms(ours_along), rms(ours_across), cosine)
 
 
+def vertices(path: Path) -> np.ndarray:
+    """The vertices of a PLY as isomorph writes it, or of an OBJ."""
+    if path.suffix != ".obj":
+        return read_ply(path)[0]
+    lines = (line.split() for line in path.read_text().splitlines())
+    return np.array([words[1:4] for words in lines if words[:1] == ["v"]], float)
+
+
 def carried(binary: str, run: Path, times: list[float]) -> list[np.ndarray]:
     """The source's vertices at the times, in the units of the sequence."""
     with tempfile.TemporaryDirectory() as folder:
@@ -83,9 +92,7 @@ def carried(binary: str, run: Path, times: list[float]) -> list[np.ndarray]:
         except (OSError, subprocess.CalledProcessError) as reason:
             raise PaperError(f"{binary} extract: failed ({reason})") from reason
         entries = json.loads((Path(folder) / "frames.json").read_text())
-        if not all(entry["carried"].endswith(".ply") for entry in entries):
-            raise PaperError(f"{run}: its source is not a PLY, as those of `isomorph compare` are")
-        return [read_ply(Path(folder) / entry["carried"])[0] for entry in entries]
+        return [vertices(Path(folder) / entry["carried"]) for entry in entries]
 
 
 def bows(sequence: Sequence, pair: tuple[int, int], paths: list[np.ndarray]) -> list[Bow]:

@@ -59,6 +59,12 @@ class Sequences(unittest.TestCase):
         area = bow.area(vertices, triangles)
         self.assertAlmostEqual(found.across, (1 - np.cos(0.5)) * reach / np.sqrt(area))
 
+    def test_an_obj_is_read_by_its_vertices(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "a.obj"
+            path.write_text("# a\nv 1 2 3\nvn 0 0 1\nv 4 5 6 0.5 0.5 0.5\nf 1 2 1\n")
+            np.testing.assert_array_equal(bow.vertices(path), [[1, 2, 3], [4, 5, 6]])
+
     def test_bad_frames_and_other_vertices_are_one_line(self):
         vertices, triangles = sphere(8)
         with tempfile.TemporaryDirectory() as folder:

@@ -206,7 +206,7 @@ EXPERIMENTS = (
         (FOX_HEAD,),
         (
             *shares("global-swaps", (0, 1, 5, 10), (), "plain distance"),
-            *shares("global-swaps", (0, 1, 5, 10), ROBUST, "Geman-McClure"),
+            *shares("global-swaps", (0, 10), ROBUST, "Geman-McClure"),
         ),
         "sweep",
         "pairs permuted, %",
