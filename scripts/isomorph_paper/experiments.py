@@ -260,10 +260,15 @@ EXPERIMENTS = (
     ),
     Experiment(
         "incomplete",
-        "Three holes in the source and three others in the target; the truth has none.",
+        "Clouds without normals; three holes in the source, three others in the target.",
         (FOX_HEAD, ARMS),
         (
             Row("complete", input=Input("holes", 0)),
+            Row(
+                "complete: no normals given",
+                keys=("data.normals=estimate",),
+                input=Input("holes", 0),
+            ),
             Row("with holes", input=Input("holes", 3)),
         ),
     ),

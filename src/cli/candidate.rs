@@ -174,3 +174,110 @@ pub(super) fn measure<B: ModelBackend>(
         Err(error) => Err(anyhow::anyhow!("{error}")),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use burn::tensor::Tensor;
+    use burn_ndarray::NdArray;
+    use isomorph_model::{Carried as CarriedGeometry, Geometry, Motion};
+
+    use super::*;
+    use crate::shape::Bounds;
+
+    type Points = Tensor<NdArray, 2>;
+
+    /// A ball of radius 0.3 about `(0.4 t - 0.2, 0, 0)`.
+    struct Ball {
+        /// Whether it says that a flow carries it.
+        says: bool,
+    }
+
+    /// Along the first axis by `0.4 span`.
+    fn moved(x: Points, span: f64) -> Points {
+        let by = Tensor::<NdArray, 1>::from_floats([0.4 * span, 0.0, 0.0], &x.device());
+        x + by.unsqueeze()
+    }
+
+    impl CarriedGeometry<NdArray> for Ball {
+        fn tolerance(&self) -> f64 {
+            1e-3
+        }
+
+        fn ends(&self, x: Points, time: f64) -> Points {
+            Tensor::cat(vec![moved(x.clone(), -time), moved(x, 1.0 - time)], 1)
+        }
+
+        fn value_from(&self, ends: Points, _: f64) -> Points {
+            let start = ends.clone().slice([0..ends.dims()[0], 0..3]);
+            moved(start, 0.5).square().sum_dim(1).sqrt() - 0.3
+        }
+    }
+
+    impl Geometry<NdArray> for Ball {
+        fn value(&self, x: Points, t: Points) -> Points {
+            let time = f64::from(t.into_data().iter::<f32>().next().unwrap_or(0.0));
+            self.value_from(self.ends(x, time), time)
+        }
+
+        fn carried(&self) -> Option<&dyn CarriedGeometry<NdArray>> {
+            self.says.then_some(self)
+        }
+    }
+
+    struct Right;
+
+    impl Motion<NdArray> for Right {
+        fn carry(&self, x: Points, from: f64, to: f64) -> Points {
+            moved(x, to - from)
+        }
+    }
+
+    /// The least and the greatest first coordinate of the surface to align with, at times in turn.
+    fn reach(says: bool, times: &[f64]) -> Vec<[f64; 2]> {
+        let truth = Normalisation {
+            centre: [0.0; 3],
+            scale: 1.0,
+        };
+        let trained = Trained::<NdArray> {
+            shape: Surface::Field(Box::new(Ball { says })),
+            motion: Some(Box::new(Right)),
+            normalisation: truth,
+            bounds: Bounds {
+                min: [-0.7; 3],
+                max: [0.7; 3],
+            },
+            smallest_component: 0.0,
+            device: Default::default(),
+        };
+        let grid = |cells| Grid::new(trained.bounds.min, trained.bounds.max, cells);
+        let mut measured = Measured {
+            trained: &trained,
+            truth,
+            fine: grid(64).expect("a good grid"),
+            coarse: grid(COARSE).expect("a good grid"),
+            anchor: None,
+        };
+        let reach = times.iter().map(|time| {
+            let mesh = measured.surface(*time, Purpose::Aligning);
+            let mesh = mesh.expect("no failure").expect("a surface");
+            let first = mesh.vertices.iter().map(|x| x[0]);
+            let widest = |[least, most]: [f64; 2], x: f64| [least.min(x), most.max(x)];
+            first.fold([f64::INFINITY, f64::NEG_INFINITY], widest)
+        });
+        reach.collect()
+    }
+
+    #[test]
+    fn surfaces_to_align_with_are_where_the_shape_is_between_anchors_too() {
+        // On an anchor, to either side of one, across the middle between two, and back.
+        let times = [0.5, 0.52, 0.54, 0.0, 1.0, 0.47];
+        for says in [true, false] {
+            for ([least, most], time) in reach(says, &times).into_iter().zip(times) {
+                let centre = 0.4 * time - 0.2;
+                // The poles lie within a coarse cell's chord of vertices: (1.4 / 48)^2 / (8 * 0.3).
+                assert!((least - (centre - 0.3)).abs() < 1e-3, "{time}: {least}");
+                assert!((most - (centre + 0.3)).abs() < 1e-3, "{time}: {most}");
+            }
+        }
+    }
+}
