@@ -182,7 +182,6 @@ mod tests {
     use isomorph_model::{Carried as CarriedGeometry, Geometry, Motion};
 
     use super::*;
-    use crate::shape::Bounds;
 
     type Points = Tensor<NdArray, 2>;
 
@@ -234,25 +233,14 @@ mod tests {
 
     /// The least and the greatest first coordinate of the surface to align with, at times in turn.
     fn reach(says: bool, times: &[f64]) -> Vec<[f64; 2]> {
-        let truth = Normalisation {
-            centre: [0.0; 3],
-            scale: 1.0,
-        };
-        let trained = Trained::<NdArray> {
-            shape: Surface::Field(Box::new(Ball { says })),
+        let trained = Trained {
             motion: Some(Box::new(Right)),
-            normalisation: truth,
-            bounds: Bounds {
-                min: [-0.7; 3],
-                max: [0.7; 3],
-            },
-            smallest_component: 0.0,
-            device: Default::default(),
+            ..Trained::of_field(Ball { says })
         };
         let grid = |cells| Grid::new(trained.bounds.min, trained.bounds.max, cells);
         let mut measured = Measured {
             trained: &trained,
-            truth,
+            truth: trained.normalisation,
             fine: grid(64).expect("a good grid"),
             coarse: grid(COARSE).expect("a good grid"),
             anchor: None,

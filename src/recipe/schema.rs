@@ -15,7 +15,7 @@ pub(super) struct Key {
     pub(super) field: &'static str,
     pub(super) doc: &'static str,
     pub(super) rule: Rule,
-    /// TOML for quick, default and paper; `_` where only the user can know.
+    /// TOML for quick, default, quality and paper; `_` where only the user can know.
     pub(super) columns: [&'static str; 4],
 }
 

@@ -4,7 +4,7 @@ use burn::tensor::Tensor;
 use isomorph_model::{Geometry, ModelBackend};
 
 use super::frames::FramesError;
-use super::trained::{Surface, Trained};
+use super::trained::{Surface, Trained, some_of};
 use crate::tensors::{host, rows};
 
 /// The most vertices of a surface that are looked at.
@@ -35,8 +35,7 @@ impl<B: ModelBackend> Trained<B> {
         if self.motion.is_none() || vertices.is_empty() {
             return Ok(None);
         }
-        let apart = vertices.len().div_ceil(LOOKED_AT);
-        let start: Vec<[f32; 3]> = vertices.iter().step_by(apart).copied().collect();
+        let start = some_of(vertices, LOOKED_AT);
         let (mut off, mut missed) = (0.0, 0.0);
         for end in [0.0, 1.0] {
             let there = self.carry(&start, time, end)?;
@@ -70,7 +69,6 @@ mod tests {
     use isomorph_model::Motion;
 
     use super::*;
-    use crate::shape::{Bounds, Normalisation};
 
     type Points = Tensor<NdArray, 2>;
 
@@ -108,19 +106,9 @@ mod tests {
     }
 
     fn agreement(speed: f64, more: f64) -> Agreement {
-        let trained = Trained::<NdArray> {
-            shape: Surface::Field(Box::new(Ball { speed })),
+        let trained = Trained {
             motion: Some(Box::new(Right { more })),
-            normalisation: Normalisation {
-                centre: [0.0; 3],
-                scale: 1.0,
-            },
-            bounds: Bounds {
-                min: [-1.0; 3],
-                max: [1.0; 3],
-            },
-            smallest_component: 0.0,
-            device: Default::default(),
+            ..Trained::of_field(Ball { speed })
         };
         // The two poles along the motion, where a shift is a distance.
         let at = |x: f64| [(speed * 0.5 + x) as f32, 0.0, 0.0];
@@ -151,20 +139,7 @@ mod tests {
 
     #[test]
     fn without_a_motion_nothing_is_said() {
-        let trained = Trained::<NdArray> {
-            shape: Surface::Field(Box::new(Ball { speed: 0.0 })),
-            motion: None,
-            normalisation: Normalisation {
-                centre: [0.0; 3],
-                scale: 1.0,
-            },
-            bounds: Bounds {
-                min: [-1.0; 3],
-                max: [1.0; 3],
-            },
-            smallest_component: 0.0,
-            device: Default::default(),
-        };
+        let trained = Trained::of_field(Ball { speed: 0.0 });
         let found = trained.agreement(&[[0.4, 0.0, 0.0]], 0.0);
         assert_eq!(found.expect("nothing fails"), None);
     }

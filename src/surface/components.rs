@@ -39,18 +39,18 @@ impl SurfaceMesh {
         pieces
     }
 
-    /// The pieces that have at least `share` of the whole area, and how many there were; 0 keeps all, more
-    /// than 1 none.
+    /// The pieces that have at least `share` of the whole area, how many these are, and how many there were;
+    /// 0 keeps all, more than 1 none.
     #[must_use]
-    pub fn keep_at_least(self, share: f64) -> (Self, usize) {
+    pub fn keep_at_least(self, share: f64) -> (Self, usize, usize) {
         let mut pieces = self.components();
         let all = pieces.len();
         let least = share * pieces.iter().map(|piece| piece.area).sum::<f64>();
         pieces.retain(|piece| piece.area >= least);
         if pieces.len() == all {
-            return (self, all);
+            return (self, all, all);
         }
-        (self.only(&pieces), all)
+        (self.only(&pieces), pieces.len(), all)
     }
 
     /// The mesh of some of its pieces, without vertices that no triangle uses; the order of
@@ -130,22 +130,22 @@ mod tests {
     fn filters_keep_order_and_normals_and_drop_unused_vertices() {
         let mesh = scattered(&[1.0, 3.0, 2.0]);
         // Areas 0.5, 4.5 and 2 of 7 in all.
-        let (kept, all) = mesh.clone().keep_at_least(0.25);
-        assert_eq!(all, 3);
+        let (kept, count, all) = mesh.clone().keep_at_least(0.25);
+        assert_eq!((count, all), (2, 3));
         assert_eq!(kept.triangles, [[0, 1, 2], [3, 4, 5]]);
         assert_eq!(kept.vertices, mesh.vertices[4..]);
         assert_eq!(
             kept.normals.as_deref(),
             mesh.normals.as_ref().map(|normals| &normals[4..])
         );
-        assert_eq!(mesh.clone().keep_at_least(0.0), (mesh.clone(), 3));
+        assert_eq!(mesh.clone().keep_at_least(0.0), (mesh.clone(), 3, 3));
         assert!(mesh.keep_at_least(1.1).0.triangles.is_empty());
     }
 
     #[test]
     fn an_empty_mesh_has_no_pieces() {
         assert!(SurfaceMesh::default().components().is_empty());
-        let (kept, all) = SurfaceMesh::default().keep_at_least(0.1);
-        assert_eq!((kept, all), (SurfaceMesh::default(), 0));
+        let kept = SurfaceMesh::default().keep_at_least(0.1);
+        assert_eq!(kept, (SurfaceMesh::default(), 0, 0));
     }
 }

@@ -228,9 +228,9 @@ mod tests {
     use burn_ndarray::NdArray;
     use isomorph_model::Geometry;
 
-    use super::super::trained::{Surface, Trained};
+    use super::super::trained::Trained;
     use super::*;
-    use crate::shape::{Bounds, Normalisation};
+    use crate::shape::Bounds;
 
     /// A ball of radius 0.4 at time 0 whose points move along the first axis by `0.1 t sin(wave y)`.
     struct Waving {
@@ -336,15 +336,8 @@ mod tests {
             };
             let followed = waving.followed.clone();
             let trained = Trained {
-                shape: Surface::Field(Box::new(waving)),
-                motion: None,
-                normalisation: Normalisation {
-                    centre: [0.0; 3],
-                    scale: 1.0,
-                },
                 bounds: bounds(),
-                smallest_component: 0.0,
-                device: Default::default(),
+                ..Trained::of_field(waving)
             };
             let found = trained.surface_at(&grid(256), 0.5);
             let vertices = found.expect("a sphere has a surface").mesh.vertices;

@@ -84,8 +84,7 @@ impl<B: ModelBackend> Trained<B> {
             Some(found) => found,
             None => self.zero_set(geometry.as_ref(), grid, time)?,
         };
-        let (mesh, all) = found.mesh.keep_at_least(self.smallest_component);
-        let components = mesh.components().len();
+        let (mesh, components, all) = found.mesh.keep_at_least(self.smallest_component);
         Ok(Found {
             mesh,
             components,
@@ -125,10 +124,7 @@ impl<B: ModelBackend> Trained<B> {
             let mut map = FlowMap::new(carried, time, &self.device, grid, stride);
             let found = extract(|points| Ok::<_, Infallible>(map.values(points)), grid)
                 .map_err(|reason| FramesError::Extract { time, reason })?;
-            let vertices = &found.mesh.vertices;
-            let apart = vertices.len().div_ceil(CHECKED);
-            let checked: Vec<_> = vertices.iter().step_by(apart).copied().collect();
-            if map.is_close_at(&checked) {
+            if map.is_close_at(&some_of(&found.mesh.vertices, CHECKED)) {
                 return Ok(Some(found));
             }
             stride /= 2;
@@ -223,6 +219,33 @@ impl<B: ModelBackend> Trained<B> {
     }
 }
 
+/// At most so many of the points, evenly spread over their order.
+pub(super) fn some_of(points: &[[f32; 3]], most: usize) -> Vec<[f32; 3]> {
+    let apart = points.len().div_ceil(most).max(1);
+    points.iter().step_by(apart).copied().collect()
+}
+
+#[cfg(test)]
+impl Trained<burn_ndarray::NdArray> {
+    /// A field in a box of half-width 0.7 about the origin, in coordinates of its own; no piece is left out.
+    pub fn of_field(geometry: impl Geometry<burn_ndarray::NdArray> + 'static) -> Self {
+        Self {
+            shape: Surface::Field(Box::new(geometry)),
+            motion: None,
+            normalisation: Normalisation {
+                centre: [0.0; 3],
+                scale: 1.0,
+            },
+            bounds: Bounds {
+                min: [-0.7; 3],
+                max: [0.7; 3],
+            },
+            smallest_component: 0.0,
+            device: Default::default(),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use burn_ndarray::NdArray;
@@ -247,18 +270,8 @@ mod tests {
     #[test]
     fn pieces_below_the_share_are_left_out_and_counted() {
         let mut trained = Trained {
-            shape: Surface::Field(Box::new(Balls)),
-            motion: None,
-            normalisation: Normalisation {
-                centre: [0.0; 3],
-                scale: 1.0,
-            },
-            bounds: Bounds {
-                min: [-0.7; 3],
-                max: [0.7; 3],
-            },
             smallest_component: 0.02,
-            device: Default::default(),
+            ..Trained::of_field(Balls)
         };
         let grid = Grid::new(trained.bounds.min, trained.bounds.max, 64).expect("a good grid");
         let found = trained.surface_at(&grid, 0.0).expect("a surface");
