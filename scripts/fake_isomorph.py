@@ -30,7 +30,8 @@ def metrics(error, time):
 
 
 def compared(error, time, **more):
-    return metrics(error, time) | more | {"aligned": metrics(error / 2, time)}
+    aligned = metrics(error / 2, time) | {name: value / 2 for name, value in more.items()}
+    return metrics(error, time) | more | {"aligned": aligned}
 
 
 def frame(error, time):

@@ -22,7 +22,7 @@ from pathlib import Path
 
 import numpy as np
 
-from isomorph_paper import PaperError, degrade, record
+from isomorph_paper import PaperError, degrade, experiments, record
 from isomorph_paper.sequences import (
     Sequence,
     area,
@@ -36,14 +36,8 @@ from isomorph_paper.sequences import (
 )
 
 ROOT = Path(__file__).resolve().parents[1]
-PAIRS = (
-    ("fox_survey", 0, 18),
-    ("fox_survey", 20, 47),
-    ("bear_walk", 0, 16),
-    ("bear_walk", 16, 30),
-    ("bear_walk", 30, 47),
-    ("human_raise_arms", 0, 26),
-    ("human_raise_arms", 26, 53),
+PAIRS = tuple(
+    (subject.sequence, *pair) for subject in experiments.PROTOCOL for pair in subject.pairs
 )
 POINTS = 20_000
 COLUMNS = (

@@ -107,6 +107,8 @@ FOX = Subject("fox_survey", ((0, 18), (20, 47)))
 FOX_HEAD = Subject("fox_survey", ((0, 18),))
 BEAR = Subject("bear_walk", ((0, 16), (16, 30), (30, 47)))
 ARMS = Subject("human_raise_arms", ((0, 26),))
+# Every pair of the evaluation protocol.
+PROTOCOL = (FOX, BEAR, Subject("human_raise_arms", ((0, 26), (26, 53))))
 HEAVY = Subject("human_male_to_heavy", ((0, 10),))
 FEET = Subject("human_feet_together", ((0, 26),), made_from="human_raise_arms")
 
