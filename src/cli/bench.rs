@@ -16,14 +16,15 @@ use crate::learner::batch::BatchSizes;
 use crate::learner::event::Phase;
 use crate::learner::settings::Settings;
 use crate::learner::{flop, memory};
-use crate::recipe::Recipe;
+use crate::recipe::{GeometryKind, Recipe};
 use crate::shape::Pair;
 
 /// Measure a training step: seconds, arithmetic, memory, and the share of the machine that it uses
 ///
-/// The step is that of the paper preset (smoothness with its Laplacian, divergence, level set, Euler's
-/// method) on two spheres of points, at one of three sizes. Efficiency is the rate of the step's matrix
-/// products over the rate of one large matrix product on the same backend.
+/// The step is made on two spheres of points: that of the preset quick or default as it is, or that of the
+/// paper preset (smoothness with its Laplacian, divergence, level set, Euler's method) at one of three
+/// sizes. Efficiency is the rate of the step's matrix products over the rate of one large matrix product on
+/// the same backend.
 #[derive(Debug, Args)]
 pub(super) struct BenchArgs {
     /// Networks and points
@@ -58,11 +59,15 @@ const CORRESPONDENCES: usize = 1000;
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum Size {
-    /// f and V 6x128, 1000 points, 5 time steps
+    /// The preset quick: its networks, points and terms
+    Quick,
+    /// The preset default
+    Default,
+    /// The preset paper with f and V 6x128, 1000 points, 5 time steps
     Small,
-    /// f and V 8x256, 4086 points, 10 time steps
+    /// The preset paper with f and V 8x256, 4086 points, 10 time steps
     Shipped,
-    /// f 8x512, V 8x256, 4000 points, 10 time steps
+    /// The preset paper with f 8x512, V 8x256, 4000 points, 10 time steps
     Paper,
 }
 
@@ -75,13 +80,32 @@ enum Way {
 }
 
 impl Size {
-    /// Depth of both, width of f, width of V, points, time steps.
-    const fn shape(self) -> (usize, usize, usize, usize, usize) {
+    /// The preset whose step it is.
+    const fn preset(self) -> &'static str {
         match self {
+            Self::Quick => "quick",
+            Self::Default => "default",
+            Self::Small | Self::Shipped | Self::Paper => "paper",
+        }
+    }
+
+    /// What it changes of the preset.
+    fn keys(self) -> Vec<String> {
+        // Depth of both, width of f, width of V, points, time steps.
+        let (depth, width_f, width_v, points, time_steps) = match self {
+            Self::Quick | Self::Default => return Vec::new(),
             Self::Small => (6, 128, 128, 1000, 5),
             Self::Shipped => (8, 256, 256, 4086, 10),
             Self::Paper => (8, 512, 256, 4000, 10),
-        }
+        };
+        vec![
+            format!("implicit.depth={depth}"),
+            format!("implicit.width={width_f}"),
+            format!("velocity.depth={depth}"),
+            format!("velocity.width={width_v}"),
+            format!("training.batch={points}"),
+            format!("training.time-steps={time_steps}"),
+        ]
     }
 
     fn name(self) -> String {
@@ -104,7 +128,9 @@ pub(super) struct Measured {
 
 #[derive(Debug, Serialize)]
 pub(super) struct Phases {
-    warm_up: PhaseCost,
+    /// Of what has a phase in which V trains alone: not of the flow's geometry.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    warm_up: Option<PhaseCost>,
     joint: PhaseCost,
 }
 
@@ -140,14 +166,17 @@ impl Task for BenchArgs {
             Way::Nested => "nested",
             Way::Forward => "forward",
         };
-        let cost = |phase, warm_up: &str| -> Result<PhaseCost> {
-            let recipe = recipe(self.size, derivatives, warm_up, &self.set)?;
+        let recipe = |warm_up| recipe(self.size, derivatives, warm_up, &self.set);
+        let cost = |phase, recipe| {
             let repeats = self.repeats as usize;
             measure::<B>(recipe, phase, repeats, matmul_gflops, &device)
         };
+        let alone = recipe("1")?;
+        let warms_up = alone.implicit.geometry == GeometryKind::Network;
+        let warm_up = warms_up.then(|| cost(Phase::WarmUp, alone));
         let phases = Phases {
-            warm_up: cost(Phase::WarmUp, "1")?,
-            joint: cost(Phase::Joint, "0")?,
+            warm_up: warm_up.transpose()?,
+            joint: cost(Phase::Joint, recipe("0")?)?,
         };
         Ok(Measured {
             backend: B::InnerBackend::name(&device),
@@ -162,24 +191,20 @@ impl Task for BenchArgs {
     }
 }
 
-/// The paper preset at a size, all of its steps in one phase, with the changes asked for.
+/// The preset at a size, all of its steps in one phase, with the changes asked for.
 fn recipe(size: Size, derivatives: &str, warm_up: &str, changes: &[String]) -> Result<Recipe> {
-    let (depth, width_f, width_v, points, time_steps) = size.shape();
-    let text = "preset = \"paper\"\n[data]\nsource = \"spheres\"\ntarget = \"spheres\"\n";
-    let mut set = vec![
-        format!("implicit.depth={depth}"),
-        format!("implicit.width={width_f}"),
-        format!("velocity.depth={depth}"),
-        format!("velocity.width={width_v}"),
-        format!("training.batch={points}"),
-        format!("training.time-steps={time_steps}"),
+    let preset = size.preset();
+    let text =
+        format!("preset = \"{preset}\"\n[data]\nsource = \"spheres\"\ntarget = \"spheres\"\n");
+    let mut set = size.keys();
+    set.extend([
         format!("training.derivatives={derivatives}"),
         format!("training.warm-up={warm_up}"),
         format!("training.ramp-until={warm_up}"),
         "training.velocity-until=1".to_owned(),
-    ];
+    ]);
     set.extend_from_slice(changes);
-    Ok(Recipe::parse(text, std::path::Path::new("bench"), &set)?)
+    Ok(Recipe::parse(&text, std::path::Path::new("bench"), &set)?)
 }
 
 /// The median time of a step after a first one that is reported apart: it compiles kernels on a GPU.
@@ -266,10 +291,9 @@ fn print_table(measured: &Measured) {
         measured.backend, measured.size, measured.derivatives, measured.matmul_gflops
     );
     println!("phase      s/step   first step   GFLOP/step   efficiency");
-    for (name, cost) in [
-        ("warm-up", &measured.phases.warm_up),
-        ("joint", &measured.phases.joint),
-    ] {
+    let warm_up = measured.phases.warm_up.as_ref();
+    let phases = warm_up.map(|cost| ("warm-up", cost)).into_iter();
+    for (name, cost) in phases.chain([("joint", &measured.phases.joint)]) {
         println!(
             "{name:9} {:8.4} {:12.3} {:12.2} {:12.2}",
             cost.seconds_per_step, cost.first_step_seconds, cost.gflop_per_step, cost.efficiency

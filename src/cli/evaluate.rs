@@ -188,8 +188,17 @@ fn print_table(evaluation: &Evaluation, span: Span) {
         line(&format!("{name}, aligned"), &compared.aligned);
     }
     line("floor", &mean.floor);
+    for (end, result) in ["source", "target"].into_iter().zip(&evaluation.ends) {
+        if let Some(surface) = &result.surface {
+            line(&format!("surface, {end}"), &surface.metrics);
+        }
+    }
+    // The source's vertices start where they are.
+    if let Some(carried) = evaluation.ends.last().and_then(|end| end.carried.as_ref()) {
+        line("carried to target", &carried.metrics);
+    }
     println!(
         "CD x10^3 is the squared Chamfer distance of the paper; CD and HD are not squared; aligned: at the \
-         best times"
+         best times; source, target: the ends that the run has seen"
     );
 }

@@ -79,6 +79,7 @@ pub(super) fn entry(
         evaluation: Evaluation {
             frames: (1..count).map(frame).collect(),
             mean: result(0.5, surface, carried),
+            ends: Vec::new(),
         },
     }
 }

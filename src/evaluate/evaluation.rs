@@ -79,4 +79,9 @@ pub struct Evaluation {
     pub frames: Vec<FrameResult>,
     /// Their means, entry by entry.
     pub mean: FrameResult,
+    /// The two ends, which the run has seen: how well it fits them, and how far from the true ones its
+    /// vertices arrive. At times 0 and 1, so that `aligned` is the same. Empty in what earlier versions
+    /// wrote.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub ends: Vec<FrameResult>,
 }

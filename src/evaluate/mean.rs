@@ -3,7 +3,7 @@
 use super::{Compared, Evaluation, FrameResult, Metrics};
 
 impl Evaluation {
-    /// The frames with their means.
+    /// The frames with their means, without ends.
     ///
     /// An entry that some frames lack is absent from the mean: a mean over fewer frames would be
     /// compared with means over all.
@@ -12,7 +12,8 @@ impl Evaluation {
             [] => FrameResult::default(),
             frames => mean_frame(frames),
         };
-        Self { frames, mean }
+        let ends = Vec::new();
+        Self { frames, mean, ends }
     }
 }
 

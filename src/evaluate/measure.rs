@@ -25,8 +25,8 @@ impl Reference {
     /// Measures a method at all frames.
     ///
     /// `progress` is told the frames done and the frames in all: after every surface that is taken
-    /// to find the best times, with no frame done yet, and after every frame. If it breaks before
-    /// all are done, measuring ends.
+    /// to find the best times and after either end, with no frame done yet, and after every frame.
+    /// If it breaks before all are done, measuring ends.
     ///
     /// # Errors
     /// [`EvaluateError::Candidate`] and [`EvaluateError::Carrying`] if the method could not answer,
@@ -47,31 +47,43 @@ impl Reference {
             .as_ref()
             .map(|path| path.align(&self.true_vertices(), &self.grid));
         let surface_times = self.align_surfaces(candidate, &mut go_on)?;
-        let mut results = Vec::with_capacity(total);
-        for (place, frame) in self.frames.iter().enumerate() {
+        let mut measure = |frame: &TrueFrame, surface_time: Option<f64>, carried_time| {
             let truth = self.true_surface(frame, Use::Truth);
             let truth = truth.expect("the reference has measured this surface before");
-            let surface = match &surface_times {
-                Some(times) => self.measure_surface(candidate, frame, &truth, times[place])?,
+            let surface = match surface_time {
+                Some(time) => self.measure_surface(candidate, frame, &truth, time)?,
                 None => None,
             };
-            let carried = match (&carried, &carried_times) {
-                (Some(path), Some(times)) => {
-                    Some(self.measure_carried::<C>(frame, &truth, path, times[place])?)
-                }
-                _ => None,
+            let carried = match &carried {
+                Some(path) => Some(self.measure_carried::<C>(frame, &truth, path, carried_time)?),
+                None => None,
             };
-            results.push(FrameResult {
+            Ok(FrameResult {
                 frame: Some(frame.frame),
                 time: Some(frame.time),
                 surface,
                 carried,
                 linear: frame.linear.clone(),
                 floor: frame.floor.clone(),
-            });
+            })
+        };
+        let mut ends = Vec::with_capacity(self.ends.len());
+        for end in &self.ends {
+            let surface_time = surface_times.is_some().then_some(end.time);
+            ends.push(measure(end, surface_time, end.time)?);
+            go_on(0)?;
+        }
+        let mut frames = Vec::with_capacity(total);
+        for (place, frame) in self.frames.iter().enumerate() {
+            let time_of = |times: &Option<Vec<f64>>| times.as_ref().map(|times| times[place]);
+            let carried_time = time_of(&carried_times).unwrap_or(frame.time);
+            frames.push(measure(frame, time_of(&surface_times), carried_time)?);
             go_on(place + 1)?;
         }
-        Ok(Evaluation::of(results))
+        Ok(Evaluation {
+            ends,
+            ..Evaluation::of(frames)
+        })
     }
 
     /// The vertices of the first frame, carried to every time that may be needed.

@@ -86,6 +86,8 @@ pub struct Reference {
     pub(super) start: Vec<[f32; 3]>,
     pub(super) triangles: Vec<[u32; 3]>,
     pub(super) frames: Vec<TrueFrame>,
+    /// The two that a method has seen, at times 0 and 1.
+    pub(super) ends: [TrueFrame; 2],
     /// The times that the aligned ones are chosen from.
     pub(super) grid: Vec<f64>,
 }
@@ -111,25 +113,27 @@ impl Reference {
     ) -> Result<Self, TruthError> {
         options.check(span)?;
         let vertices = |frame| truth.normalised(frame, normalisation);
+        let unmeasured = |frame| TrueFrame {
+            frame,
+            time: span.time(frame),
+            vertices: vertices(frame),
+            linear: Compared::default(),
+            floor: Metrics::default(),
+        };
         let mut reference = Self {
             options,
             from: span.from(),
             start: vertices(span.from()),
             triangles: truth.triangles().to_vec(),
             frames: Vec::new(),
+            ends: [span.from(), span.to()].map(unmeasured),
             grid: evenly_spaced(options.alignment_times),
         };
         let compared = span
             .between()
             .skip(options.every - 1)
             .step_by(options.every);
-        reference.frames.extend(compared.map(|frame| TrueFrame {
-            frame,
-            time: span.time(frame),
-            vertices: vertices(frame),
-            linear: Compared::default(),
-            floor: Metrics::default(),
-        }));
+        reference.frames.extend(compared.map(unmeasured));
         let times = reference.all_times();
         let straight = VertexPath::straight(&reference.start, &vertices(span.to()), &times);
         reference
@@ -152,17 +156,30 @@ impl Reference {
         let aligned = straight.align(&self.true_vertices(), &self.grid);
         for (place, aligned) in aligned.into_iter().enumerate() {
             let frame = &self.frames[place];
-            let measure = || -> Result<(Compared, Metrics), NoArea> {
-                let truth = self.true_surface(frame, Use::Truth)?;
-                let linear = self.compare_vertices(frame, &truth, straight, aligned)?;
-                let again = self.true_surface(frame, Use::Floor)?;
-                Ok((linear, compare(&again, &truth, frame.time)))
-            };
-            let (linear, floor) = measure().map_err(|_| frame.frame)?;
-            self.frames[place].linear = linear;
-            self.frames[place].floor = floor;
+            let (linear, floor) = self.measure_reference(frame, straight, aligned)?;
+            (self.frames[place].linear, self.frames[place].floor) = (linear, floor);
+        }
+        for place in 0..self.ends.len() {
+            let end = &self.ends[place];
+            let (linear, floor) = self.measure_reference(end, straight, end.time)?;
+            (self.ends[place].linear, self.ends[place].floor) = (linear, floor);
         }
         Ok(())
+    }
+
+    fn measure_reference(
+        &self,
+        frame: &TrueFrame,
+        straight: &VertexPath,
+        aligned: f64,
+    ) -> Result<(Compared, Metrics), usize> {
+        let measure = || -> Result<(Compared, Metrics), NoArea> {
+            let truth = self.true_surface(frame, Use::Truth)?;
+            let linear = self.compare_vertices(frame, &truth, straight, aligned)?;
+            let again = self.true_surface(frame, Use::Floor)?;
+            Ok((linear, compare(&again, &truth, frame.time)))
+        };
+        measure().map_err(|_| frame.frame)
     }
 
     /// The true vertices of each frame.
@@ -173,7 +190,8 @@ impl Reference {
 
     /// The frames' own times and those of the grid, ascending, each once.
     pub(super) fn all_times(&self) -> Vec<f64> {
-        let own = self.frames.iter().map(|frame| frame.time);
+        let own = self.frames.iter().chain(&self.ends);
+        let own = own.map(|frame| frame.time);
         let mut times: Vec<f64> = own.chain(self.grid.iter().copied()).collect();
         times.sort_by(f64::total_cmp);
         times.dedup();
@@ -222,9 +240,12 @@ impl Reference {
                 ..compare(&surface, truth, time)
             })
         };
-        Ok(Compared {
-            metrics: at(frame.time)?,
-            aligned: at(aligned)?,
-        })
+        let metrics = at(frame.time)?;
+        let aligned = if aligned == frame.time {
+            metrics.clone()
+        } else {
+            at(aligned)?
+        };
+        Ok(Compared { metrics, aligned })
     }
 }

@@ -207,6 +207,37 @@ fn straight_lines_are_exact_for_a_translation_and_nothing_is_below_the_floor() {
 }
 
 #[test]
+fn the_ends_say_how_well_they_are_fitted_and_how_far_from_the_target_vertices_arrive() {
+    let numbered =
+        |ends: &[FrameResult]| -> Vec<_> { ends.iter().map(|end| (end.frame, end.time)).collect() };
+    let found = evaluated();
+    let both = [(Some(0), Some(0.0)), (Some(FRAMES - 1), Some(1.0))];
+    assert_eq!(numbered(&found.ends), both);
+    for end in &found.ends {
+        let [surface, carried] =
+            [&end.surface, &end.carried].map(|kind| kind.as_ref().expect("both"));
+        // The noise of 5000 samples, as above.
+        let ratio = surface.metrics.chamfer_squared / end.floor.chamfer_squared;
+        assert!((ratio - 1.0).abs() < 0.05, "{ratio}");
+        assert_eq!(surface.aligned, surface.metrics);
+        let rmse = carried.metrics.tracked_rmse.expect("vertices");
+        assert!(rmse < 1e-6, "{rmse}");
+    }
+    let mut short = Late::new();
+    short.way *= 0.9;
+    let reference = reference(FEW).expect("a reference");
+    let ends = reference
+        .evaluate(&mut short, go_on)
+        .expect("an evaluation")
+        .ends;
+    let carried = |end: &FrameResult| end.carried.clone().expect("carried").metrics.tracked_rmse;
+    // It starts in its place and stops a tenth of the way short.
+    assert!(carried(&ends[0]).expect("vertices") < 1e-6);
+    let arrived = carried(&ends[1]).expect("vertices");
+    assert!((arrived - short.way / 9.0).abs() < 1e-6, "{arrived}");
+}
+
+#[test]
 fn what_a_method_does_not_have_is_absent() {
     let reference = reference(FEW).expect("a reference");
     let mut late = Late::new();
@@ -328,11 +359,12 @@ fn keys(value: &Value) -> BTreeSet<&str> {
 fn the_json_has_the_keys_of_the_design() {
     let found = evaluated();
     let json = serde_json::to_value(found).expect("numbers");
-    assert_eq!(keys(&json), BTreeSet::from(["frames", "mean"]));
+    assert_eq!(keys(&json), BTreeSet::from(["frames", "mean", "ends"]));
     let kinds = BTreeSet::from(["surface", "carried", "linear", "floor"]);
     let mut of_frame = kinds.clone();
     of_frame.extend(["frame", "time"]);
     assert_eq!(keys(&json["frames"][0]), of_frame);
+    assert_eq!(keys(&json["ends"][1]), of_frame);
     assert_eq!(keys(&json["mean"]), kinds);
     let floor = BTreeSet::from([
         "time",

@@ -223,9 +223,9 @@ sections! {
     /// The steps of the optimiser and what each one samples.
     training: TrainingRecipe {
         /// Steps of the optimiser; the paper takes 10000.
-        steps: usize = 1_000 | 6_000 | 12_000 | 10_000, Rule::whole(1, MANY);
+        steps: usize = 1_000 | 6_000 | 10_000 | 10_000, Rule::whole(1, MANY);
         /// Points at which f is evaluated in each step; the paper takes 4000.
-        batch: usize = 2_200 | 4_000 | 6_000 | 4_000, Rule::whole(64, 1_000_000);
+        batch: usize = 2_200 | 4_000 | 4_000 | 4_000, Rule::whole(64, 1_000_000);
         /// Correspondences carried in each step, all of them where fewer are known; the paper
         /// leaves it open.
         correspondence_batch: usize = 250 | 500 | 1_000 | 1_000, Rule::whole(1, 1_000_000);

@@ -115,8 +115,14 @@ fn the_json_of_an_evaluation_has_the_fields_that_are_documented_and_no_others() 
     let (place, run) = trained();
     let ended = evaluate(&place, "truth", ["0", "4"], &["--json"]).succeeded();
     let value: Value = serde_json::from_str(&ended.stdout).expect("JSON");
-    assert_eq!(keys(&value), BTreeSet::from(["frames", "mean"]));
+    assert_eq!(keys(&value), BTreeSet::from(["frames", "mean", "ends"]));
     assert_frame(&value["mean"], &[]);
+    let ends = value["ends"].as_array().expect("a list");
+    assert_eq!(ends.len(), 2);
+    for (end, (frame, time)) in ends.iter().zip([(0, 0.0), (4, 1.0)]) {
+        assert_frame(end, &["frame", "time"]);
+        assert_eq!((&end["frame"], number(end, "time")), (&frame.into(), time));
+    }
     let frames = value["frames"].as_array().expect("a list");
     assert_eq!(frames.len(), 3);
     let mut aligned_before = 0.0;

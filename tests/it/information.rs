@@ -201,6 +201,24 @@ fn bench_reports_the_cost_of_a_step_as_json() {
 }
 
 #[test]
+fn bench_times_the_step_of_a_preset_as_well() {
+    let _turn = turn();
+    let place = Workplace::new();
+    let bench = ["bench", "--size", "quick", "--repeats", "1"];
+    let ended = place.isomorph(&[&bench[..], &["--json"]].concat());
+    let report: Value = serde_json::from_str(&ended.succeeded().stdout).expect("one object");
+    let cost = |name: &str| report["phases"]["joint"][name].as_f64();
+    assert!(cost("seconds_per_step") > Some(0.0), "{report}");
+    // 2200 points through 66,000 weights, six times two operations each: 1.7 GFLOP; V is the rest.
+    let gflop = cost("gflop_per_step").expect("a number");
+    assert!((1.7..10.0).contains(&gflop), "{gflop}");
+    assert!(report["phases"].get("warm_up").is_none(), "{report}");
+    let table = place.isomorph(&bench).succeeded().stdout;
+    assert!(table.contains("\njoint "), "{table}");
+    assert!(!table.contains("warm-up"), "{table}");
+}
+
+#[test]
 fn bench_takes_changes_of_its_recipe_and_says_which() {
     let _turn = turn();
     let place = Workplace::new();

@@ -49,7 +49,7 @@ fn a_commented_recipe_says_what_the_other_presets_have() {
     );
     let text = text.expect("Unicode paths");
     assert!(
-        text.contains("\n#steps = 1000  # default: 6000, quality: 12000, paper: 10000\n"),
+        text.contains("\n#steps = 1000  # default: 6000, quality: 10000, paper: 10000\n"),
         "{text}"
     );
     assert!(text.contains("\nsource = \"a b.ply\"\n"), "{text}");
