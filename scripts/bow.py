@@ -11,10 +11,10 @@ that swings without bending at the knee bows down. This prints, for each frame b
     along   the difference of the truth from the straight line, in the direction of that line: timing
     across  the same, at right angles to it: the bow
     ours    both of the run, from the truth
-    whole   both parts together: of the line, of the run, and of the run without what it misses of the
-            target, share by share of the time: what is lost on the way and not by where it arrives
     cosine  between the run's bow and the true one, over the vertices that move by more than .08;
             1: to the same side, -1: to the other
+    whole   both parts together: of the line, of the run, and of the run without what it misses of the
+            target, share by share of the time: what is lost on the way and not by where it arrives
 
 The last line is what can be known of where vertices arrive: a smooth function through N of them, chosen at
 random (biharmonic splines; 1000 as `compare` gives), and by how much it misses all of them.

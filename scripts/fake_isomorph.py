@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Answers like `isomorph compare`, for test_paper.py: every error follows from the row's label.
+"""Answers like `isomorph compare`, for test_paper.py and test_protocol.py: every error follows from
+the row's label.
 
 The error of a row is 0.01 and 0.001 more for each letter of its label, and its volume is 10 % too
 large at all times. Every call adds its arguments to the file FAKE_LOG, a JSON list per line; a
@@ -11,6 +12,16 @@ import os
 import re
 import sys
 from pathlib import Path
+
+
+def install(case, folder):
+    """Makes the program `isomorph` in a folder, for one test case; the program and its log."""
+    program, log = folder / "isomorph", folder / "log"
+    program.write_text(f'#!/bin/sh\nexec "{sys.executable}" "{__file__}" "$@"\n')
+    program.chmod(0o755)
+    os.environ["FAKE_LOG"] = str(log)
+    case.addCleanup(os.environ.pop, "FAKE_FAILS", None)
+    return program, log
 
 
 def metrics(error, time):

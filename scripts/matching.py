@@ -22,7 +22,8 @@ from pathlib import Path
 
 import numpy as np
 
-from isomorph_paper import PaperError, degrade, experiments, record
+from isomorph_paper import PaperError, command_line, degrade, experiments, record
+from isomorph_paper.command_line import ROOT
 from isomorph_paper.sequences import (
     Sequence,
     area,
@@ -35,7 +36,6 @@ from isomorph_paper.sequences import (
     write_mesh,
 )
 
-ROOT = Path(__file__).resolve().parents[1]
 PAIRS = tuple(
     (subject.sequence, *pair) for subject in experiments.PROTOCOL for pair in subject.pairs
 )
@@ -68,15 +68,11 @@ from where they began, source to target and back, without any truth."""
 
 
 def arguments(words: list[str]) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
-    )
+    parser = command_line.parser(__doc__)
     add = parser.add_argument
-    add("--binary", default=str(ROOT / "target/release/isomorph"), help="the isomorph to call")
+    command_line.add_binary(parser)
     add("--out", type=Path, default=ROOT / "scripts/results/matching", help="where results go")
-    add("--sequences", type=Path, default=ROOT.parent / "shared/data", help="the .anime files")
+    command_line.add_sequences(parser)
     add("--seed", type=int, default=0, help="of the inputs and of the matching")
     add("--only", default="", help="the rows whose name holds this text")
     options = parser.parse_args(words)

@@ -21,32 +21,31 @@ import sys
 import time
 from pathlib import Path
 
-from isomorph_paper import PaperError, experiments, figures, inputs, record, report, runs
+from isomorph_paper import (
+    PaperError,
+    command_line,
+    experiments,
+    figures,
+    inputs,
+    record,
+    report,
+    runs,
+)
+from isomorph_paper.command_line import ROOT
 from isomorph_paper.sequences import digest, write_atomically
-
-ROOT = Path(__file__).resolve().parents[1]
 
 
 def arguments(words: list[str]) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
-    )
+    parser = command_line.parser(__doc__)
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "isomorph-paper"
     add = parser.add_argument
     add("name", metavar="NAME", help="an experiment, `all` or `list`")
     add("--full", action="store_true", help="the paper's size instead of one for two cores")
-    add("--binary", default=str(ROOT / "target/release/isomorph"), help="the isomorph to call")
+    command_line.add_binary(parser)
     add("--backend", help="handed on to isomorph")
     add("--out", type=Path, default=ROOT / "scripts/results", help="where results go")
     add("--dry-run", action="store_true", help="print the commands, make nothing")
-    add(
-        "--sequences",
-        type=Path,
-        default=ROOT.parent / "shared/data",
-        help="the folder of the .anime files",
-    )
+    command_line.add_sequences(parser)
     add(
         "--cache",
         type=Path,

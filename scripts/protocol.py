@@ -19,11 +19,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from isomorph_paper import PaperError, experiments, record, runs
+from isomorph_paper import PaperError, command_line, experiments, record, runs
+from isomorph_paper.command_line import ROOT
 from isomorph_paper.report import entry, mean_of
 from isomorph_paper.sequences import Sequence, read_sequence, write_atomically
-
-ROOT = Path(__file__).resolve().parents[1]
 
 
 @dataclass(frozen=True)
@@ -87,25 +86,16 @@ class Measured:
 
 
 def arguments(words: list[str]) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
-    )
+    parser = command_line.parser(__doc__)
     add = parser.add_argument
     add("--method", default="default", help="a preset or method of `isomorph compare`")
     add("--seeds", default="0,1,2", help="of the training, with commas between")
     add("--every", type=int, default=4, help="every so many frames are measured")
-    add("--binary", default=str(ROOT / "target/release/isomorph"), help="the isomorph to call")
+    command_line.add_binary(parser)
     add("--out", type=Path, default=ROOT / "scripts/results/protocol", help="where results go")
     add("--table", action="store_true", help="train nothing: the table of what is there")
     add("--dry-run", action="store_true", help="print the commands, make nothing")
-    add(
-        "--sequences",
-        type=Path,
-        default=ROOT.parent / "shared/data",
-        help="the folder of the .anime files",
-    )
+    command_line.add_sequences(parser)
     options = parser.parse_args(words)
     try:
         options.seeds = [int(seed) for seed in options.seeds.split(",")]

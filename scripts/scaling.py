@@ -30,10 +30,10 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from isomorph_paper import PaperError, figures, record
+from isomorph_paper import PaperError, command_line, figures, record
+from isomorph_paper.command_line import ROOT
 from isomorph_paper.sequences import digest, write_atomically
 
-ROOT = Path(__file__).resolve().parents[1]
 
 # What `bench --size shipped` is, by name.
 BASE = {"points": 4086, "width": 256, "depth": 8, "time-steps": 10}
@@ -90,14 +90,10 @@ class Point:
 
 
 def arguments(words: list[str]) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
-    )
+    parser = command_line.parser(__doc__)
     add = parser.add_argument
     add("--backend", choices=("flex", "ndarray", "wgpu"), default="flex", help="default: flex")
-    add("--binary", default=str(ROOT / "target/release/isomorph"), help="the isomorph to call")
+    command_line.add_binary(parser)
     add("--repeats", type=int, default=5, help="steps timed at each point (default: 5)")
     add("--threads", default="1,2", help="numbers of threads (default: 1,2)")
     add("--sweep", action="append", choices=SWEEPS, help="only this one; may be repeated")

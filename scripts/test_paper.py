@@ -20,11 +20,10 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+import fake_isomorph
 import paper
 from isomorph_paper import PaperError, experiments, inputs, runs, sequences
 from test_degrade import sphere
-
-FAKE = Path(__file__).with_name("fake_isomorph.py")
 
 EXPECTED_FILES = {"table.md", "table.json", "figure.svg", "run.json"}
 
@@ -88,12 +87,7 @@ class Experiments(unittest.TestCase):
         }
         for name in names:
             sequences.write_sequence(self.folder / "in" / f"{name}.anime", growing, triangles)
-        self.binary = self.folder / "isomorph"
-        self.binary.write_text(f'#!/bin/sh\nexec "{sys.executable}" "{FAKE}" "$@"\n')
-        self.binary.chmod(0o755)
-        self.log = self.folder / "log"
-        os.environ["FAKE_LOG"] = str(self.log)
-        self.addCleanup(os.environ.pop, "FAKE_FAILS", None)
+        self.binary, self.log = fake_isomorph.install(self, self.folder)
 
     def paper(self, *words):
         """The status, stdout and stderr of a command."""

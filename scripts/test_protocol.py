@@ -14,11 +14,10 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+import fake_isomorph
 import protocol
 from isomorph_paper import experiments, sequences
 from test_degrade import sphere
-
-FAKE = Path(__file__).with_name("fake_isomorph.py")
 
 
 class Protocol(unittest.TestCase):
@@ -33,12 +32,7 @@ class Protocol(unittest.TestCase):
         for subject in experiments.PROTOCOL:
             path = self.folder / "in" / f"{subject.sequence}.anime"
             self.sequence = sequences.write_sequence(path, frames, triangles)
-        self.binary = self.folder / "isomorph"
-        self.binary.write_text(f'#!/bin/sh\nexec "{sys.executable}" "{FAKE}" "$@"\n')
-        self.binary.chmod(0o755)
-        self.log = self.folder / "log"
-        os.environ["FAKE_LOG"] = str(self.log)
-        self.addCleanup(os.environ.pop, "FAKE_FAILS", None)
+        self.binary, self.log = fake_isomorph.install(self, self.folder)
 
     def protocol(self, *words):
         """The status, stdout and stderr of a command."""

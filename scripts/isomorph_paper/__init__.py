@@ -6,6 +6,7 @@ topology.py     two feet that merge: a sequence whose ends differ in topology
 experiments.py  the table of all experiments: data, not code
 inputs.py       makes the input files that a row of an experiment asks for
 runs.py         calls `isomorph compare` and reads what it measured
+command_line.py what several commands are asked in the same words
 report.py       table and numbers        figures.py  pictures        record.py  how it was made
 """
 
