@@ -136,7 +136,9 @@ def bows(sequence: Sequence, pair: tuple[int, int], paths: list[np.ndarray]) -> 
     arrived = paths[-1] * scale
     for frame, run in zip(range(first + 1, last), paths[:-1], strict=True):
         if len(run) != len(ends[0]):
-            raise PaperError(f"the run carries {len(run)} vertices, the sequence has {len(ends[0])}")
+            raise PaperError(
+                f"the run carries {len(run)} vertices, the sequence has {len(ends[0])}"
+            )
         time = (frame - first) / (last - first)
         start, end, truth, run = (each * scale for each in (*ends, sequence.frames[frame], run))
         found.append(bow((start, end), time, truth, run, arrived))
@@ -191,7 +193,9 @@ def main(words: list[str]) -> int:
     for frame, one in zip(range(first + 1, last), found, strict=True):
         print(row.format(frame, *astuple(one)))
     print(row.format("mean", *np.mean([astuple(one) for one in found], axis=0)))
-    start, end = (sequence.frames[frame] * scale_of(sequence, (first, last)) for frame in given.pair)
+    start, end = (
+        sequence.frames[frame] * scale_of(sequence, (first, last)) for frame in given.pair
+    )
     miss = spline_miss(start, end, given.known)
     print(f"splines through {given.known} of {len(start)} vertices miss the target by {miss:.4f}")
     return 0

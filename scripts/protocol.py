@@ -221,7 +221,11 @@ def markdown(all_pairs: list[Measured], options: argparse.Namespace, words: list
         f"# `{options.method}` by the protocol",
         "\n".join(f"| {' | '.join(cells)} |" for cells in table),
         CAPTION,
-        f"Goals met: {met} of {goals * len(all_pairs)}. Missed:" if missed else "All goals are met.",
+        (
+            f"Goals met: {met} of {goals * len(all_pairs)}. Missed:"
+            if missed
+            else "All goals are met."
+        ),
         "\n".join(missed),
         f"Measured {dates[0]} to {dates[-1]}, on {machine['processor']}, {machine['cores']} cores. "
         f"Made by `{shlex.join(['python3', 'scripts/protocol.py', *words])}`.",

@@ -30,7 +30,9 @@ def read_sequence(path, wanted):
     """The wanted frames as lists of (x, y, z), and the triangles as lists of (i, j, k)."""
     data = path.read_bytes()
     frames, vertices, triangles = struct.unpack_from("<3i", data)
-    rows = lambda form, start, count: list(struct.iter_unpack(form, data[start : start + 12 * count]))
+    rows = lambda form, start, count: list(
+        struct.iter_unpack(form, data[start : start + 12 * count])
+    )
     first = rows("<3f", 12, vertices)
     faces = rows("<3i", 12 + 12 * vertices, triangles)
     offsets_start = 12 + 12 * (vertices + triangles)

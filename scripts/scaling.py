@@ -34,7 +34,6 @@ from isomorph_paper import PaperError, command_line, figures, record
 from isomorph_paper.command_line import ROOT
 from isomorph_paper.sequences import digest, write_atomically
 
-
 # What `bench --size shipped` is, by name.
 BASE = {"points": 4086, "width": 256, "depth": 8, "time-steps": 10}
 

@@ -75,7 +75,11 @@ class Protocol(unittest.TestCase):
         self.assertIn("pieces: up to 2", shown)
         entry = {"evaluation": {"mean": fake_mean(1.1, 0.9), "frames": [{"surface": pieces(1)}]}}
         shown = " ".join(protocol.misses(protocol.Measured("ball", (0, 9), {0: entry}, 1.0)))
-        for each in ["CD x10^3: 1.21", "HD: 1.10", "vertices aligned x10^2: 0.90 of the lines', at most 0.8"]:
+        for each in [
+            "CD x10^3: 1.21",
+            "HD: 1.10",
+            "vertices aligned x10^2: 0.90 of the lines', at most 0.8",
+        ]:
             self.assertIn(each, shown)
 
     def test_an_even_growth_does_not_swell(self):

@@ -106,6 +106,7 @@ class Experiment:
 FOX = Subject("fox_survey", ((0, 18), (20, 47)))
 FOX_HEAD = Subject("fox_survey", ((0, 18),))
 BEAR = Subject("bear_walk", ((0, 16), (16, 30), (30, 47)))
+BEAR_STEP = Subject("bear_walk", ((30, 47),))
 ARMS = Subject("human_raise_arms", ((0, 26),))
 # Every pair of the evaluation protocol.
 PROTOCOL = (FOX, BEAR, Subject("human_raise_arms", ((0, 26), (26, 53))))
@@ -300,7 +301,7 @@ EXPERIMENTS = (
     Experiment(
         "ablation",
         "Each part of the recipe taken out or exchanged: geometry, priors of V, integrators.",
-        (FOX_HEAD, ARMS),
+        (FOX_HEAD, BEAR_STEP, ARMS),
         (
             Row("quick", "quick"),
             Row("quick: seed 1", "quick", ("training.seed=1",)),
