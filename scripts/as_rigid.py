@@ -27,7 +27,7 @@ from isomorph_paper import PaperError, command_line, degrade, experiments, recor
 from isomorph_paper.command_line import ROOT
 from isomorph_paper.report import mean_of
 from isomorph_paper.rigid import AsRigid
-from isomorph_paper.sequences import Sequence, area, digest, read_sequence, write_atomically
+from isomorph_paper.sequences import Sequence, digest, read_sequence, rms, write_atomically
 
 SAMPLES = 100_000
 TIMES = 129
@@ -61,10 +61,6 @@ def arguments(words: list[str]) -> argparse.Namespace:
     if options.every < 1:
         parser.error(f"--every = {options.every}: must be 1 or more")
     return options
-
-
-def rms(off: np.ndarray) -> float:
-    return float(np.sqrt((off**2).sum(axis=1).mean()))
 
 
 def distances(
@@ -120,7 +116,7 @@ def pair_of(sequence: Sequence, pair: tuple[int, int], every: int) -> dict:
     if not frames:
         raise PaperError(f"--every = {every}: no frame of {sequence.name} {first}-{last} is left")
     triangles = sequence.triangles
-    size = np.mean([area(sequence.frames[frame], triangles) for frame in pair]) ** -0.5
+    size = sequence.unit_scale(pair)
     source, target = (size * sequence.frames[frame] for frame in pair)
     truth = [size * sequence.frames[frame] for frame in frames]
     times = [(frame - first) / (last - first) for frame in frames]
@@ -195,8 +191,7 @@ def run(options: argparse.Namespace, words: list[str]) -> None:
         "date": date,
         "machine": machine,
     }
-    place = f"{machine['processor']}, {machine['cores']} cores"
-    text = markdown(rows, preset, f"Made by `{command}` on {date[:10]}, {place}.")
+    text = markdown(rows, preset, record.made_by(command, date, machine))
     write_atomically(options.out / "table.md", text.encode())
     write_atomically(options.out / "data.json", (json.dumps(data, indent=1) + "\n").encode())
     print(text)

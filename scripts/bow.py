@@ -35,7 +35,7 @@ import numpy as np
 
 from gallery import read_ply
 from isomorph_paper import PaperError
-from isomorph_paper.sequences import Sequence, area, read_sequence
+from isomorph_paper.sequences import Sequence, read_sequence, rms
 
 # Vertices that move by less have no direction worth the name.
 MOVES = 0.08
@@ -59,10 +59,6 @@ def parts(vectors: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.n
     """The parts of vectors in these unit directions and at right angles to them."""
     along = (vectors * directions).sum(axis=1, keepdims=True) * directions
     return along, vectors - along
-
-
-def rms(vectors: np.ndarray) -> float:
-    return float(np.sqrt((vectors**2).sum(axis=1).mean()))
 
 
 def bow(
@@ -121,17 +117,11 @@ def carried(binary: str, run: Path, times: list[float]) -> list[np.ndarray]:
         return [vertices(Path(folder) / entry["carried"]) for entry in entries]
 
 
-def scale_of(sequence: Sequence, pair: tuple[int, int]) -> float:
-    """What brings both ends to a mean area of 1."""
-    ends = (sequence.frames[frame] for frame in pair)
-    return (sum(area(end, sequence.triangles) for end in ends) / 2) ** -0.5
-
-
 def bows(sequence: Sequence, pair: tuple[int, int], paths: list[np.ndarray]) -> list[Bow]:
     """Of every frame strictly between; `paths` are the run's vertices at their times and at time 1."""
     first, last = pair
     ends = [sequence.frames[frame] for frame in pair]
-    scale = scale_of(sequence, pair)
+    scale = sequence.unit_scale(pair)
     found = []
     arrived = paths[-1] * scale
     for frame, run in zip(range(first + 1, last), paths[:-1], strict=True):
@@ -193,9 +183,8 @@ def main(words: list[str]) -> int:
     for frame, one in zip(range(first + 1, last), found, strict=True):
         print(row.format(frame, *astuple(one)))
     print(row.format("mean", *np.mean([astuple(one) for one in found], axis=0)))
-    start, end = (
-        sequence.frames[frame] * scale_of(sequence, (first, last)) for frame in given.pair
-    )
+    scale = sequence.unit_scale((first, last))
+    start, end = (sequence.frames[frame] * scale for frame in given.pair)
     miss = spline_miss(start, end, given.known)
     print(f"splines through {given.known} of {len(start)} vertices miss the target by {miss:.4f}")
     return 0

@@ -26,7 +26,6 @@ from isomorph_paper import PaperError, command_line, degrade, experiments, recor
 from isomorph_paper.command_line import ROOT
 from isomorph_paper.sequences import (
     Sequence,
-    area,
     digest,
     read_sequence,
     unit,
@@ -132,7 +131,7 @@ def measure(sequence: Sequence, ends: tuple[int, int], make, options) -> dict:
         truth = make(sequence, ends, folder, options.seed)
         report, pairs = matched(options.binary, folder, options.seed)
         source, target = (read_vertices(folder / f"{end}.ply") for end in ("source", "target"))
-    scale = np.mean([area(sequence.frames[frame], sequence.triangles) for frame in ends]) ** -0.5
+    scale = sequence.unit_scale(ends)
     error = scale * np.linalg.norm(target[pairs[:, 1]] - truth[pairs[:, 0]], axis=1)
     nearest = error < 1e-6
     return {
@@ -195,8 +194,7 @@ def main(words: list[str]) -> int:
         "machine": machine,
         "versions": record.versions(options.binary),
     }
-    place = f"{machine['processor']}, {machine['cores']} cores"
-    text = markdown(rows, f"Made by `{command}` on {date[:10]}, {place}.")
+    text = markdown(rows, record.made_by(command, date, machine))
     write_atomically(options.out / "table.md", text.encode())
     write_atomically(options.out / "data.json", (json.dumps(data, indent=1) + "\n").encode())
     print(text)

@@ -165,9 +165,7 @@ def sequence_digests(truths: dict) -> dict:
 
 def leave(experiment, budget, measured, truths, folder: Path, command: str) -> None:
     """Writes the tables and the figure."""
-    machine = record.machine()
-    place = f"{machine['processor']}, {machine['cores']} cores"
-    how = f"Made by `{command}` on {record.now()[:10]}, {place}."
+    how = record.made_by(command, record.now(), record.machine())
     texts = {
         "table.md": report.markdown(experiment, budget, measured, how),
         "table.json": report.numbers(experiment, measured),

@@ -148,9 +148,7 @@ def run(points: list[Point], options: argparse.Namespace, command: str) -> None:
             write_atomically(path, (json.dumps(entry, indent=1) + "\n").encode())
         measured[point] = read(path)
     rows = [row(point, entry) for point, entry in measured.items()]
-    machine = record.machine()
-    place = f"{machine['processor']}, {machine['cores']} cores"
-    how = f"Made by `{command}` on {record.now()[:10]}, {place}."
+    how = record.made_by(command, record.now(), record.machine())
     text = markdown(rows, options, how)
     write_atomically(folder / "table.md", text.encode())
     write_atomically(folder / "table.json", (json.dumps(rows, indent=1) + "\n").encode())

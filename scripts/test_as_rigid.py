@@ -17,13 +17,8 @@ import as_rigid
 from isomorph_paper import experiments
 from isomorph_paper.rigid import AsRigid
 from isomorph_paper.sequences import area, write_sequence
+from test_bow import turned
 from test_degrade import sphere
-
-
-def turned(points: np.ndarray, angle: float) -> np.ndarray:
-    """About the z axis."""
-    c, s = np.cos(angle), np.sin(angle)
-    return points @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
 
 
 def bent(points: np.ndarray, angle: float) -> np.ndarray:

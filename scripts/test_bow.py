@@ -12,6 +12,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 
 import bow
+from isomorph_paper import sequences
 from isomorph_paper.sequences import Sequence, write_sequence
 from test_degrade import sphere
 
@@ -65,7 +66,7 @@ class Sequences(unittest.TestCase):
         sequence = Sequence(Path("s"), frames, triangles)
         (found,) = bow.bows(sequence, (0, 2), [frames[1], frames[2]])
         reach = np.sqrt((vertices[:, :2] ** 2).sum(axis=1).mean())
-        area = bow.area(vertices, triangles)
+        area = sequences.area(vertices, triangles)
         self.assertAlmostEqual(found.across, (1 - np.cos(0.5)) * reach / np.sqrt(area))
 
     def test_splines_are_exact_where_they_know_and_for_affine_motions(self):

@@ -82,6 +82,11 @@ def machine() -> dict:
     }
 
 
+def made_by(command: str, date: str, on: dict) -> str:
+    """The last line of a table: the command, the day, and the machine as `machine` tells it."""
+    return f"Made by `{command}` on {date[:10]}, {on['processor']}, {on['cores']} cores."
+
+
 def processor() -> str:
     """The processor's name; Linux alone says it in a file."""
     try:

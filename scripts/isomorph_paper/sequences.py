@@ -32,6 +32,10 @@ class Sequence:
         """The enclosed volume of a frame."""
         return volume(self.frames[frame], self.triangles)
 
+    def unit_scale(self, pair: tuple[int, int]) -> float:
+        """What brings two frames together to a mean area of 1."""
+        return (sum(area(self.frames[frame], self.triangles) for frame in pair) / 2) ** -0.5
+
 
 def read_sequence(path: Path) -> Sequence:
     """Reads an .anime file; a PaperError names what is wrong with it."""
@@ -75,6 +79,11 @@ def area_vectors(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 def area(vertices: np.ndarray, triangles: np.ndarray) -> float:
     """The surface area of a mesh."""
     return float(np.linalg.norm(area_vectors(vertices, triangles), axis=1).sum() / 2)
+
+
+def rms(vectors: np.ndarray) -> float:
+    """The root mean square length of (n, dimensions) vectors."""
+    return float(np.sqrt((vectors**2).sum(axis=1).mean()))
 
 
 def volume(vertices: np.ndarray, triangles: np.ndarray) -> float:
