@@ -123,13 +123,12 @@ def run(experiment: experiments.Experiment, options: argparse.Namespace, words: 
     figures.check()
     wanted = record.settings(experiment.name, budget)
     record.begin(folder, wanted)
-    before = runs.entries(folder)
     done, truths = carry_out(experiment, plan, budget, paths)
-    if runs.entries(folder) == before and (folder / "table.md").exists():
+    measured = runs.collect(experiment, size, folder)
+    if are_in_table(report.numbers(experiment, measured), folder):
         # The date and the times on record are those of the runs, not of this look at them.
         print(f"{folder}: all rows were there already; left as it was")
         return
-    measured = runs.collect(experiment, size, folder)
     how = {
         "command": shlex.join(words),
         "binary": options.binary,
@@ -138,6 +137,13 @@ def run(experiment: experiments.Experiment, options: argparse.Namespace, words: 
     }
     leave(experiment, budget, measured, truths, folder, shlex.join(words))
     record.write(folder, wanted, how)
+
+
+def are_in_table(numbers: str, folder: Path) -> bool:
+    """Whether the tables that are there are of these numbers."""
+    table = folder / "table.json"
+    there = (folder / "table.md").exists() and table.exists()
+    return there and table.read_text() == numbers
 
 
 def carry_out(experiment, plan, budget, paths) -> tuple[dict, dict]:

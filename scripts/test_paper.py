@@ -227,6 +227,18 @@ class Experiments(unittest.TestCase):
         self.assertEqual(self.paper("topology")[0], 0)
         self.assertNotEqual(json.loads(record.read_text())["date"], "2001-01-01")
 
+    def test_tables_of_older_rows_are_written_anew(self):
+        self.paper("topology")
+        table, text = (self.folder / "out/topology" / name for name in ("table.json", "table.md"))
+        fresh = text.read_text()
+        # As if a row had been run again since.
+        table.write_text(table.read_text().replace("chamfer_squared", "chamfer_of_old", 1))
+        text.write_text("old")
+        _, out, _ = self.paper("topology")
+        self.assertNotIn("left as it was", out)
+        strip = lambda lines: [line for line in lines.splitlines() if line.startswith("|")]
+        self.assertEqual(strip(text.read_text()), strip(fresh))
+
     def test_a_failed_run_is_said_and_leaves_no_table(self):
         os.environ["FAKE_FAILS"] = "1"
         status, _, err = self.paper("sparse")

@@ -120,12 +120,6 @@ class Paths:
     results: Path
 
 
-def entries(folder: Path) -> dict[str, bytes]:
-    """What `compare` has measured in a folder: the file of each pair and row, and its content."""
-    files = sorted(folder.glob("*/*-*.*.json"))
-    return {str(file.relative_to(folder)): file.read_bytes() for file in files}
-
-
 def call_binary(words: list[str]) -> None:
     """Runs a command; its progress goes where ours goes."""
     print(f"$ {shlex.join(words)}", file=sys.stderr, flush=True)

@@ -12,6 +12,7 @@ mod extract;
 mod info;
 mod init;
 mod match_shapes;
+mod normals;
 mod paired;
 mod resume;
 mod train;
@@ -56,6 +57,7 @@ enum Command {
     Evaluate(evaluate::EvaluateArgs),
     Compare(compare::CompareArgs),
     Match(match_shapes::MatchArgs),
+    Normals(normals::NormalsArgs),
     Init(init::InitArgs),
     Info(info::InfoArgs),
     Bench(bench::BenchArgs),
@@ -118,6 +120,7 @@ pub fn run(cli: Cli) -> ExitCode {
         Command::Evaluate(args) => evaluate::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Match(args) => match_shapes::run(args),
+        Command::Normals(args) => normals::run(args),
         Command::Init(args) => init::run(args),
         Command::Info(args) => info::run(args),
         Command::Bench(args) => bench::run(args),

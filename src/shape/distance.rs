@@ -1,11 +1,15 @@
 //! Signed distances to a surface that is known by points with normals, negative inside.
 //!
 //! Far from the surface the distance to the nearest point is that to the surface but for the points'
-//! spacing; close to it, where that error would count, the distance to the tangent planes of the nearest
-//! points takes over. The sign is that of the planes' weighted sum, so that one odd normal decides nothing.
+//! spacing, and the sign is that of the winding number, so that no few wrong normals decide about all the
+//! space that they are nearest to. Close to it, where the spacing would count, the distance to the tangent
+//! planes of the nearest points takes over, with the sign of their weighted sum.
 
 use std::num::NonZeroUsize;
 
+use rayon::prelude::*;
+
+use super::winding::{self, Charges, SummationTree};
 use super::{NeighbourSearch, mesh};
 
 /// Nearest points whose planes are averaged.
@@ -14,12 +18,17 @@ const PLANES: NonZeroUsize = NonZeroUsize::new(4).expect("4 is not 0");
 /// Distances below this many spacings are measured to the planes.
 const CLOSE: f64 = 2.0;
 
+/// The neighbour whose distance is the spacing of the points.
+const SPACING: usize = 3;
+
 /// Points with normals, arranged for distance queries.
 #[derive(Debug)]
 pub struct SignedDistance {
     search: NeighbourSearch,
     points: Vec<[f64; 3]>,
     normals: Vec<[f32; 3]>,
+    tree: SummationTree,
+    dipoles: Charges<3>,
     close: f64,
 }
 
@@ -32,19 +41,24 @@ impl SignedDistance {
         assert_eq!(points.len(), normals.len(), "one normal per point");
         let points: Vec<[f64; 3]> = points.iter().map(|point| point.map(f64::from)).collect();
         let search = NeighbourSearch::new(&points);
-        let second = |point: &[f64; 3]| {
-            let found = search.nearest(*point, PLANES);
-            found.last().map_or(0.0, |last| last.squared_distance)
-        };
-        // The distance to the third neighbour, in the mean over a hundred points.
-        let step = points.len().div_ceil(100);
-        let sampled = points.iter().step_by(step);
-        let count = sampled.len() as f64;
-        let spacing = (sampled.map(second).sum::<f64>() / count).sqrt();
+        let neighbours = search.nearest_of_each(&points, winding::NEIGHBOURS);
+        let spacings = neighbours
+            .par_iter()
+            .map(|found| found[SPACING.min(found.len() - 1)].squared_distance);
+        let softening: Vec<f64> = spacings.collect();
+        let spacing = (softening.iter().sum::<f64>() / points.len() as f64).sqrt();
+        let tree = SummationTree::new(&points, &softening);
+        let dipoles = normals
+            .iter()
+            .zip(winding::areas(&neighbours))
+            .map(|(normal, area)| normal.map(|n| f64::from(n) * area));
+        let dipoles = tree.charges(&dipoles.collect::<Vec<_>>());
         Self {
             search,
             points,
             normals: normals.to_vec(),
+            tree,
+            dipoles,
             close: CLOSE * spacing,
         }
     }
@@ -67,7 +81,12 @@ impl SignedDistance {
         // From the planes to the nearest point between one and two times `close`: no jump.
         let share = (distance / self.close - 1.0).clamp(0.0, 1.0);
         let magnitude = plane.abs().min(distance) * (1.0 - share) + distance * share;
-        magnitude.copysign(plane) as f32
+        let side = if share > 0.0 {
+            0.5 - self.tree.winding(&self.dipoles, x)
+        } else {
+            plane
+        };
+        magnitude.copysign(side) as f32
     }
 }
 
@@ -93,6 +112,23 @@ mod tests {
                     "at {radius} in {direction:?}: {found}"
                 );
             }
+        }
+    }
+
+    #[test]
+    fn no_few_wrong_normals_decide_about_the_space_beyond_them() {
+        let points = sphere_cloud(5000, 0.3, 2);
+        // A cap of 1.5 % of the sphere is turned over.
+        let turned = |p: &[f64; 3]| if p[0] > 0.97 * 0.3 { -1.0 } else { 1.0 };
+        let normal = |p: &[f64; 3]| p.map(|c| (turned(p) * c / 0.3) as f32);
+        let normals: Vec<[f32; 3]> = points.iter().map(normal).collect();
+        let points: Vec<[f32; 3]> = points.iter().map(|p| p.map(|c| c as f32)).collect();
+        let distance = SignedDistance::new(&points, &normals);
+        for beyond in [0.45, 0.6, 1.0] {
+            assert!(distance.at([beyond, 0.0, 0.0]) > 0.0, "at {beyond}");
+        }
+        for within in [0.0, 0.1, 0.2] {
+            assert!(distance.at([within, 0.0, 0.0]) < 0.0, "at {within}");
         }
     }
 }

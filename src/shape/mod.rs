@@ -7,6 +7,7 @@
 //! | `connected.rs` | which vertices of a mesh hang together |
 //! | `sample.rs` | area-uniform points on a mesh |
 //! | `neighbours.rs` | k nearest neighbours |
+//! | `winding.rs` | winding numbers of points with normals, and areas of points |
 //! | `distance.rs` | signed distances to points with normals |
 //! | `normals.rs` | normals of a raw cloud, pointing outwards |
 //! | `correspond.rs` | pairs of vertices that are known to correspond |
@@ -33,6 +34,7 @@ pub(crate) mod ply;
 mod sample;
 #[cfg(test)]
 mod testing;
+mod winding;
 
 pub use anime::Sequence;
 pub use correspond::Correspondences;
@@ -40,7 +42,7 @@ pub use distance::SignedDistance;
 pub use error::ShapeError;
 pub use neighbours::{Neighbour, NeighbourSearch};
 pub use normalise::{Bounds, Normalisation, cloud_area};
-pub use normals::estimate_normals;
+pub use normals::{EstimatedNormals, estimate_normals};
 pub(crate) use pair::points_of;
 pub use pair::{Cloud, CorrespondenceSource, DataOptions, NormalSource, Pair, prepare};
 pub use sample::{SurfaceSamples, sample_surface};

@@ -1,48 +1,75 @@
 //! Normals of a raw point cloud, all pointing out of the shape.
 //!
-//! After Hoppe, DeRose, Duchamp, McDonald and Stuetzle, "Surface reconstruction from unorganized
-//! points", SIGGRAPH 1992: the normal line at a point is the direction in which its k nearest
-//! neighbours spread least (the eigenvector of their covariance with the least eigenvalue); the
-//! signs are made consistent along a minimum spanning tree of the neighbour graph under the weight
-//! `1 - |n_i . n_j|`, so that they pass between points whose tangent planes nearly agree first.
+//! The normal line at a point is the direction in which its k nearest neighbours spread least (the
+//! eigenvector of their covariance with the least eigenvalue; Hoppe, DeRose, Duchamp, McDonald and
+//! Stuetzle, "Surface reconstruction from unorganized points", SIGGRAPH 1992). Its sign is passed
+//! from neighbour to neighbour, surest first (`normals/propagate.rs`), and held against what the
+//! cloud as a whole tells of inside and outside (`normals/evidence.rs`): parts that clearly know
+//! their outside are not turned over by a link between them that crosses from sheet to sheet.
 //!
 //! # Differs from the paper
-//! Each connected component is turned outwards by its extreme points along all three axes, both
-//! ways, each weighted by how squarely its normal faces that way, where the paper asks only the
-//! topmost.
+//! Hoppe et al. take the signs along a minimum spanning tree of the tangent planes' agreement and
+//! turn its topmost point upwards. Between the sheets of a thin part, and where parts touch, the
+//! planes agree and the signs do not: fingers, toes and the inside of a mouth come out turned over.
 //!
-//! What it cannot do: where two sheets are closer than the spacing of the points, the signs may
-//! pass across; a denser cloud, or normals from the scanner, are the cure.
+//! What it cannot do: where two sheets are closer than the spacing of the points, the plane itself
+//! is wrong; a denser cloud, or normals from the scanner, are the cure.
+
+mod evidence;
+mod propagate;
 
 use std::num::NonZeroUsize;
 
 use rayon::prelude::*;
 
+use super::winding::areas;
 use super::{Neighbour, NeighbourSearch, mesh};
 
 /// Neighbours that the plane is fitted to, the point itself included.
 const NEIGHBOURS: NonZeroUsize = NonZeroUsize::new(12).expect("not zero");
 
+/// The neighbour whose distance is the spacing of the points.
+const SPACING: usize = 3;
+
+/// Squared heights about the fitted plane that a point's place is softened by: two deviations.
+const NOISE: f64 = 4.0;
+
 /// Sweeps of Jacobi rotations: a 3 x 3 matrix is diagonal to float64 after about five.
 const SWEEPS: usize = 8;
 
-/// Unit normals of the points, consistent and outward.
+/// What is known of the normals of a raw cloud.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EstimatedNormals {
+    /// Unit normals of the points, consistent and outward.
+    pub normals: Vec<[f32; 3]>,
+    /// How clearly the cloud as a whole tells that this side is out, from 1 (surely) over 0 (not at
+    /// all) to -1: it surely tells the opposite, and the neighbours have overruled it.
+    pub certainty: Vec<f64>,
+}
+
+/// Normals of points from their places alone.
 ///
 /// # Panics
 /// If there are no points.
-pub fn estimate_normals(points: &[[f64; 3]]) -> Vec<[f32; 3]> {
+pub fn estimate_normals(points: &[[f64; 3]]) -> EstimatedNormals {
     let neighbours = NeighbourSearch::new(points).nearest_of_each(points, NEIGHBOURS);
-    let lines = neighbours
-        .par_iter()
-        .map(|found| plane_normal(points, found));
-    let mut normals: Vec<[f64; 3]> = lines.collect();
-    let tree = spanning_tree(&normals, &neighbours);
-    orient(points, &mut normals, &tree);
-    normals.into_iter().map(super::unit).collect()
+    let fit = |found: &Vec<Neighbour>| {
+        let (normal, variance) = tangent_plane(points, found);
+        let spacing = found[SPACING.min(found.len() - 1)].squared_distance;
+        (normal, spacing + NOISE * variance.max(0.0))
+    };
+    let (lines, softening): (Vec<[f64; 3]>, Vec<f64>) = neighbours.par_iter().map(fit).unzip();
+    let evidence = evidence::outward(points, &lines, &areas(&neighbours), &softening);
+    let signs = propagate::signs(points, &lines, &neighbours, &evidence);
+    let turned = |(line, sign): (&[f64; 3], &f64)| super::unit(line.map(|x| x * sign));
+    EstimatedNormals {
+        normals: lines.iter().zip(&signs).map(turned).collect(),
+        certainty: signs.iter().zip(evidence).map(|(s, e)| s * e).collect(),
+    }
 }
 
-/// The direction in which the neighbours spread least.
-fn plane_normal(points: &[[f64; 3]], neighbours: &[Neighbour]) -> [f64; 3] {
+/// The direction in which the neighbours spread least, and the variance along it.
+fn tangent_plane(points: &[[f64; 3]], neighbours: &[Neighbour]) -> ([f64; 3], f64) {
     let count = neighbours.len() as f64;
     // Relative to one of them: far from the origin the sums would cancel.
     let origin = points[neighbours[0].index as usize];
@@ -59,15 +86,16 @@ fn plane_normal(points: &[[f64; 3]], neighbours: &[Neighbour]) -> [f64; 3] {
         let x = mesh::difference(place, mean);
         for row in 0..3 {
             for column in 0..3 {
-                covariance[row][column] += x[row] * x[column];
+                covariance[row][column] += x[row] * x[column] / count;
             }
         }
     }
     least_eigenvector(covariance)
 }
 
-/// The eigenvector of a symmetric matrix with the least eigenvalue, by cyclic Jacobi rotations.
-fn least_eigenvector(mut a: [[f64; 3]; 3]) -> [f64; 3] {
+/// The eigenvector of a symmetric matrix with the least eigenvalue, and that eigenvalue, by cyclic
+/// Jacobi rotations.
+fn least_eigenvector(mut a: [[f64; 3]; 3]) -> ([f64; 3], f64) {
     // Columns of `vectors` become the eigenvectors, the diagonal of `a` the eigenvalues.
     let mut vectors = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     for (p, q) in [(0, 1), (0, 2), (1, 2)].repeat(SWEEPS) {
@@ -93,128 +121,23 @@ fn least_eigenvector(mut a: [[f64; 3]; 3]) -> [f64; 3] {
         .into_iter()
         .min_by(|&i, &j| a[i][i].total_cmp(&a[j][j]));
     let least = least.expect("three eigenvalues");
-    [vectors[0][least], vectors[1][least], vectors[2][least]]
-}
-
-/// A minimum spanning forest of the neighbour graph (Kruskal), as lists of the points next to each.
-fn spanning_tree(normals: &[[f64; 3]], neighbours: &[Vec<Neighbour>]) -> Vec<Vec<u32>> {
-    let mut edges: Vec<(f32, u32, u32)> = Vec::with_capacity(normals.len() * NEIGHBOURS.get());
-    for (from, found) in neighbours.iter().enumerate() {
-        for to in found.iter().map(|neighbour| neighbour.index) {
-            let agreement = mesh::dot(normals[from], normals[to as usize]).abs();
-            edges.push(((1.0 - agreement) as f32, from as u32, to));
-        }
-    }
-    // Ties are broken by the indices, so that the tree is the same on every run.
-    edges.par_sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
-    let mut sets = DisjointSets::new(normals.len());
-    let mut tree = vec![Vec::new(); normals.len()];
-    for (_, from, to) in edges {
-        if sets.unite(from, to) {
-            tree[from as usize].push(to);
-            tree[to as usize].push(from);
-        }
-    }
-    tree
-}
-
-/// Turns the normals so that they agree along the tree, and each of its components outwards.
-fn orient(points: &[[f64; 3]], normals: &mut [[f64; 3]], tree: &[Vec<u32>]) {
-    let mut reached = vec![false; points.len()];
-    for root in 0..points.len() {
-        if reached[root] {
-            continue;
-        }
-        reached[root] = true;
-        let mut component = vec![root];
-        let mut next = 0;
-        while next < component.len() {
-            let from = component[next];
-            next += 1;
-            for to in tree[from].iter().map(|&to| to as usize) {
-                if !reached[to] {
-                    reached[to] = true;
-                    if mesh::dot(normals[from], normals[to]) < 0.0 {
-                        normals[to] = normals[to].map(|coordinate| -coordinate);
-                    }
-                    component.push(to);
-                }
-            }
-        }
-        if outwardness(points, normals, &component) < 0.0 {
-            for &member in &component {
-                normals[member] = normals[member].map(|coordinate| -coordinate);
-            }
-        }
-    }
-}
-
-/// Positive if the normals at the component's extreme points point out of it: at the point
-/// farthest along a direction the surface faces that direction.
-fn outwardness(points: &[[f64; 3]], normals: &[[f64; 3]], component: &[usize]) -> f64 {
-    let mut sum = 0.0;
-    for axis in 0..3 {
-        let along = |&a: &&usize, &b: &&usize| points[*a][axis].total_cmp(&points[*b][axis]);
-        let top = component
-            .iter()
-            .max_by(along)
-            .expect("a component has its root");
-        let bottom = component
-            .iter()
-            .min_by(along)
-            .expect("a component has its root");
-        sum += normals[*top][axis] - normals[*bottom][axis];
-    }
-    sum
-}
-
-/// Union-find over indices, with path halving and union by size.
-struct DisjointSets {
-    parent: Vec<u32>,
-    size: Vec<u32>,
-}
-
-impl DisjointSets {
-    fn new(count: usize) -> Self {
-        Self {
-            parent: (0..count as u32).collect(),
-            size: vec![1; count],
-        }
-    }
-
-    fn root(&mut self, mut member: u32) -> u32 {
-        while self.parent[member as usize] != member {
-            let grandparent = self.parent[self.parent[member as usize] as usize];
-            self.parent[member as usize] = grandparent;
-            member = grandparent;
-        }
-        member
-    }
-
-    /// Joins the sets of two members; false if they were one already.
-    fn unite(&mut self, a: u32, b: u32) -> bool {
-        let (mut large, mut small) = (self.root(a), self.root(b));
-        if large == small {
-            return false;
-        }
-        if self.size[large as usize] < self.size[small as usize] {
-            std::mem::swap(&mut large, &mut small);
-        }
-        self.parent[small as usize] = large;
-        self.size[large as usize] += self.size[small as usize];
-        true
-    }
+    let vector = [vectors[0][least], vectors[1][least], vectors[2][least]];
+    (vector, a[least][least])
 }
 
 #[cfg(test)]
 mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, Normal};
+
     use super::*;
     use crate::shape::testing::{sphere_cloud, torus_cloud};
 
     /// The share of normals within 90 degrees of the true ones, and the mean angle between the
     /// lines in degrees.
     fn quality(points: &[[f64; 3]], truth: &[[f64; 3]]) -> (f64, f64) {
-        let estimated = estimate_normals(points);
+        let estimated = estimate_normals(points).normals;
         let cosines = estimated
             .iter()
             .zip(truth)
@@ -264,6 +187,57 @@ mod tests {
     }
 
     #[test]
+    fn a_hollow_is_turned_into_itself() {
+        // The wall of the hollow is part of the shape's surface: out of the shape is into it.
+        let (outer, inner) = (sphere_cloud(6000, 1.0, 25), sphere_cloud(3000, 0.7, 26));
+        let inwards = inner.iter().map(|p| p.map(|x| -x / 0.7));
+        let truth: Vec<[f64; 3]> = outer.iter().copied().chain(inwards).collect();
+        assert_eq!(quality(&[outer, inner].concat(), &truth).0, 1.0);
+    }
+
+    #[test]
+    fn signs_do_not_cross_between_near_sheets() {
+        // Two spheres, 0.03 apart where points lie 0.03 apart: a spanning tree of the tangent planes'
+        // agreement turns one of them over.
+        let directions = [sphere_cloud(6000, 1.0, 27), sphere_cloud(6000, 1.0, 28)].concat();
+        let shifted = directions.iter().enumerate();
+        let points: Vec<[f64; 3]> = shifted
+            .map(|(i, n)| [n[0] + if i < 6000 { 0.0 } else { 2.03 }, n[1], n[2]])
+            .collect();
+        let (outward, _) = quality(&points, &directions);
+        // Where they touch, some planes are fitted through both. Measured 0.9987.
+        assert!(outward > 0.995, "{outward}");
+    }
+
+    #[test]
+    fn both_sides_of_a_thin_plate_point_out_of_it() {
+        // Half as thick as the points' spacing, 0.01.
+        let mut rng = ChaCha8Rng::seed_from_u64(29);
+        let mut point = |side: f64| {
+            let [x, y] = [0, 1].map(|_| rng.random_range(0.0..1.0));
+            ([x, y, 0.0025 * side], [0.0, 0.0, side])
+        };
+        let sides = [1.0, -1.0].repeat(10_000);
+        let (points, truth): (Vec<_>, Vec<_>) = sides.into_iter().map(&mut point).unzip();
+        let (outward, _) = quality(&points, &truth);
+        assert!(outward > 0.98, "{outward}");
+    }
+
+    #[test]
+    fn noise_of_half_the_spacing_turns_few_signs() {
+        let directions = sphere_cloud(10_000, 1.0, 30);
+        let mut rng = ChaCha8Rng::seed_from_u64(31);
+        let noise = Normal::new(0.0, 0.02).expect("a deviation");
+        let points: Vec<[f64; 3]> = directions
+            .iter()
+            .map(|n| n.map(|x| x + noise.sample(&mut rng)))
+            .collect();
+        let (outward, _) = quality(&points, &directions);
+        // Those that are wrong are planes that stand on edge, 2.9 % of them. Measured 0.996.
+        assert!(outward > 0.99, "{outward}");
+    }
+
+    #[test]
     fn the_least_eigenvector_is_that_of_a_matrix_built_from_it() {
         let least = [0.36, 0.48, 0.8];
         let other = [0.8, -0.6, 0.0];
@@ -277,13 +251,15 @@ mod tests {
             }
         }
         // Jacobi is accurate to a few roundings of the largest entry.
-        assert!((mesh::dot(least_eigenvector(matrix), least).abs() - 1.0).abs() < 1e-14);
+        let (vector, value) = least_eigenvector(matrix);
+        assert!((mesh::dot(vector, least).abs() - 1.0).abs() < 1e-14);
+        assert!((value - 0.1).abs() < 1e-14);
     }
 
     #[test]
     fn duplicates_and_a_plane_give_unit_normals() {
         let plane = (0..2000).map(|i| [f64::from(i / 2 % 40), f64::from(i / 80), 4.0]);
-        let normals = estimate_normals(&plane.collect::<Vec<_>>());
+        let normals = estimate_normals(&plane.collect::<Vec<_>>()).normals;
         // Exactly the plane's own line; either sign is right, but it must be one.
         assert!(
             normals
@@ -292,7 +268,7 @@ mod tests {
             "{:?}",
             normals[0]
         );
-        let spot = estimate_normals(&[[1.0; 3]; 100]);
+        let spot = estimate_normals(&[[1.0; 3]; 100]).normals;
         assert!(
             spot.iter()
                 .all(|n| n.iter().map(|x| x * x).sum::<f32>() == 1.0)

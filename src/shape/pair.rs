@@ -11,6 +11,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::mesh::{self, EdgeSharing};
 use super::sample::point_at;
+use super::winding::is_inside_out;
 use super::{
     Bounds, Correspondences, FEWEST_POINTS, Normalisation, Shape, ShapeError, estimate_normals,
     sample_surface,
@@ -218,13 +219,22 @@ pub(crate) fn points_of(
         if let (NormalSource::Auto, Err(problem)) = (wanted, &normals) {
             notes.push(format!("{name}: {problem}: estimated from its points"));
         }
+        // Not turned, as a closed mesh's are: of a cloud nobody knows whether it is closed.
+        if let (NormalSource::Auto, Ok(normals)) = (wanted, &normals)
+            && is_inside_out(&shape.vertices, normals)
+        {
+            notes.push(format!(
+                "{name}: the file's normals point inwards on the whole: taken as they are; if the shape is \
+                 closed, set data.normals = \"estimate\" or turn them"
+            ));
+        }
         (shape.vertices.clone(), normals.ok())
     };
     let normals = match wanted {
         NormalSource::None => None,
-        NormalSource::Estimate => Some(estimate_normals(&points)),
+        NormalSource::Estimate => Some(estimate_normals(&points).normals),
         NormalSource::Auto | NormalSource::Given => {
-            Some(given.unwrap_or_else(|| estimate_normals(&points)))
+            Some(given.unwrap_or_else(|| estimate_normals(&points).normals))
         }
     };
     Ok((points, normals))

@@ -134,6 +134,7 @@ fn every_command_has_help_that_names_its_defaults() {
             "match",
             &["--aligned", "[default: pairs.csv]", "[default: 0.5]"],
         ),
+        ("normals", &["--output", "all pointing out"]),
         ("init", &["[default: none]", "[default: default]"]),
         ("info", &["recipe", "run"]),
         ("bench", &["--json"]),

@@ -14,6 +14,7 @@ mod golden;
 mod information;
 mod matching;
 mod methods;
+mod normals;
 mod outputs;
 mod paper;
 mod resume;

@@ -183,10 +183,19 @@ fn a_cloud_is_used_as_it_is_with_its_own_normals_or_estimated_ones() {
     // 5 % of the 500 points there are, not of the 1,000 asked of meshes.
     assert_eq!(pair.correspondences.len(), 25);
     assert!(
-        pair.notes[0].contains("b.obj: the file has no normals: estimated"),
+        pair.notes[0].contains("a.obj: the file's normals point inwards on the whole"),
         "{:?}",
         pair.notes
     );
+    assert!(
+        pair.notes[1].contains("b.obj: the file has no normals: estimated"),
+        "{:?}",
+        pair.notes
+    );
+    assert_eq!(pair.notes.len(), 2);
+    write_cloud(&options.source, &points, Some(&points));
+    assert_eq!(prepare(&options).expect("prepared").notes.len(), 1);
+    write_cloud(&options.source, &points, Some(&inward));
     let outward = |cloud: &Cloud| {
         let normals = cloud.normals.as_ref().expect("normals");
         let pairs = cloud.points.iter().zip(normals);
