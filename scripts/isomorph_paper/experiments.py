@@ -248,6 +248,7 @@ EXPERIMENTS = (
             Row("smoothness off", keys=("loss.smoothness=0", *NO_STRAIN)),
         ),
         keys=("data.correspondence-fraction=0.01",),
+        network=True,
     ),
     Experiment(
         "sparse",

@@ -4,6 +4,9 @@
 //! spacing, and the sign is that of the winding number, so that no few wrong normals decide about all the
 //! space that they are nearest to. Close to it, where the spacing would count, the distance to the tangent
 //! planes of the nearest points takes over, with the sign of their weighted sum.
+//!
+//! Inside is where the winding number is above that on the surface itself, the mean of its two sides: 1/2 for
+//! a closed surface, less for a scan from one side, 0 for a flat sheet, whose sides are those of its plane.
 
 use std::num::NonZeroUsize;
 
@@ -18,6 +21,9 @@ const PLANES: NonZeroUsize = NonZeroUsize::new(4).expect("4 is not 0");
 /// Distances below this many spacings are measured to the planes.
 const CLOSE: f64 = 2.0;
 
+/// Points, at most, whose winding numbers tell that on the surface.
+const LEVELS: usize = 1000;
+
 /// The neighbour whose distance is the spacing of the points.
 const SPACING: usize = 3;
 
@@ -29,6 +35,8 @@ pub struct SignedDistance {
     normals: Vec<[f32; 3]>,
     tree: SummationTree,
     dipoles: Charges<3>,
+    /// The winding number on the surface.
+    level: f64,
     close: f64,
 }
 
@@ -53,7 +61,12 @@ impl SignedDistance {
             .zip(winding::areas(&neighbours))
             .map(|(normal, area)| normal.map(|n| f64::from(n) * area));
         let dipoles = tree.charges(&dipoles.collect::<Vec<_>>());
+        let some = points.par_iter().step_by(points.len().div_ceil(LEVELS));
+        let mut levels: Vec<f64> = some.map(|&point| tree.winding(&dipoles, point)).collect();
+        // The median: those at wrong normals are far off.
+        levels.sort_by(f64::total_cmp);
         Self {
+            level: levels[levels.len() / 2],
             search,
             points,
             normals: normals.to_vec(),
@@ -82,7 +95,7 @@ impl SignedDistance {
         let share = (distance / self.close - 1.0).clamp(0.0, 1.0);
         let magnitude = plane.abs().min(distance) * (1.0 - share) + distance * share;
         let side = if share > 0.0 {
-            0.5 - self.tree.winding(&self.dipoles, x)
+            self.level - self.tree.winding(&self.dipoles, x)
         } else {
             plane
         };
@@ -129,6 +142,24 @@ mod tests {
         }
         for within in [0.0, 0.1, 0.2] {
             assert!(distance.at([within, 0.0, 0.0]) < 0.0, "at {within}");
+        }
+    }
+
+    #[test]
+    fn a_scan_from_one_side_has_two_sides() {
+        // The cap of a sphere that is seen from above: flat enough for winding numbers below 1/2.
+        let cap = sphere_cloud(20_000, 1.0, 3);
+        let cap: Vec<[f64; 3]> = cap.into_iter().filter(|p| p[2] > 0.8).collect();
+        let points: Vec<[f32; 3]> = cap.iter().map(|p| p.map(|c| c as f32)).collect();
+        let distance = SignedDistance::new(&points, &points);
+        for height in [0.05, 0.1, 0.3, 1.0] {
+            assert!(
+                distance.at([0.05, 0.0, 1.0 + height]) > 0.0,
+                "{height} above"
+            );
+        }
+        for depth in [0.05, 0.1, 0.2] {
+            assert!(distance.at([0.05, 0.0, 1.0 - depth]) < 0.0, "{depth} below");
         }
     }
 }

@@ -159,24 +159,21 @@ impl Parts {
     /// stand against all of their neighbours; a finger does, held by few links at its root.
     fn settle(mut self, links: &[Link]) -> Vec<f64> {
         let count = self.parent.len();
-        let roots: Vec<(usize, bool)> = (0..count as u32).map(|member| self.root(member)).collect();
+        let relative = |(root, opposite)| (root, if opposite { -1.0 } else { 1.0 });
+        let roots: Vec<(usize, f64)> = (0..count as u32)
+            .map(|member| relative(self.root(member)))
+            .collect();
         // Of each root: the sign of its part, at first by its own evidence.
         let mut signs: Vec<f64> = (self.evidence.iter())
             .map(|&evidence| if evidence < 0.0 { -1.0 } else { 1.0 })
             .collect();
-        let refused: Vec<(usize, usize, f64)> = (links.iter())
-            .filter_map(|link| {
-                let [(a, turned_a), (b, turned_b)] =
-                    [link.from, link.to].map(|member| roots[member as usize]);
-                let agreement = f64::from(link.agreement);
-                let agreement = if turned_a ^ turned_b {
-                    -agreement
-                } else {
-                    agreement
-                };
-                (a != b).then_some((a, b, NEIGHBOUR * agreement))
-            })
-            .collect();
+        let between = |link: &Link| {
+            let [(a, sign_a), (b, sign_b)] =
+                [link.from, link.to].map(|member| roots[member as usize]);
+            let agreement = NEIGHBOUR * f64::from(link.agreement) * sign_a * sign_b;
+            (a != b).then_some((a, b, agreement))
+        };
+        let refused: Vec<(usize, usize, f64)> = links.iter().filter_map(between).collect();
         let mut hold = vec![0.0; count];
         loop {
             for &(a, b, _) in &refused {
@@ -187,17 +184,16 @@ impl Parts {
                 hold[a] += agreement * signs[a] * signs[b];
                 hold[b] += agreement * signs[a] * signs[b];
             }
-            // Each turn takes away from what contradicts: it ends.
+            // Each turn takes from what contradicts more than rounding could give back: it ends.
             let weakest = (refused.iter())
                 .flat_map(|&(a, b, _)| [a, b])
                 .min_by(|&a, &b| hold[a].total_cmp(&hold[b]));
             match weakest {
-                Some(part) if hold[part] < -f64::EPSILON => signs[part] = -signs[part],
+                Some(part) if hold[part] < -1e-6 => signs[part] = -signs[part],
                 _ => break,
             }
         }
-        let sign =
-            |&(root, opposite): &(usize, bool)| signs[root] * if opposite { -1.0 } else { 1.0 };
+        let sign = |&(root, relative): &(usize, f64)| signs[root] * relative;
         roots.iter().map(sign).collect()
     }
 }
