@@ -5,8 +5,10 @@
 //! space that they are nearest to. Close to it, where the spacing would count, the distance to the tangent
 //! planes of the nearest points takes over, with the sign of their weighted sum.
 //!
-//! Inside is where the winding number is above that on the surface itself, the mean of its two sides: 1/2 for
-//! a closed surface, less for a scan from one side, 0 for a flat sheet, whose sides are those of its plane.
+//! Inside is where the winding number is above a level half-way between 1/2 and that on the surface itself,
+//! the mean of its two sides: 1/2 for a closed surface, less for a scan from one side, 0 for a flat sheet. At
+//! 1/2 a scan from one side would be closed flat from rim to rim and a sheet have no inside, at the surface's
+//! own level they would not be closed at all; half-way a round sheet is closed by a bulge of 0.58 of its radius.
 
 use std::num::NonZeroUsize;
 
@@ -35,7 +37,7 @@ pub struct SignedDistance {
     normals: Vec<[f32; 3]>,
     tree: SummationTree,
     dipoles: Charges<3>,
-    /// The winding number on the surface.
+    /// The winding number that divides inside from outside.
     level: f64,
     close: f64,
 }
@@ -66,7 +68,7 @@ impl SignedDistance {
         // The median: those at wrong normals are far off.
         levels.sort_by(f64::total_cmp);
         Self {
-            level: levels[levels.len() / 2],
+            level: f64::midpoint(0.5, levels[levels.len() / 2]),
             search,
             points,
             normals: normals.to_vec(),
@@ -146,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn a_scan_from_one_side_has_two_sides() {
+    fn a_scan_from_one_side_has_two_sides_and_an_end() {
         // The cap of a sphere that is seen from above: flat enough for winding numbers below 1/2.
         let cap = sphere_cloud(20_000, 1.0, 3);
         let cap: Vec<[f64; 3]> = cap.into_iter().filter(|p| p[2] > 0.8).collect();
@@ -161,5 +163,6 @@ mod tests {
         for depth in [0.05, 0.1, 0.2] {
             assert!(distance.at([0.05, 0.0, 1.0 - depth]) < 0.0, "{depth} below");
         }
+        assert!(distance.at([0.05, 0.0, -0.5]) > 0.0, "far below");
     }
 }
