@@ -26,9 +26,6 @@ const CLOSE: f64 = 2.0;
 /// Points, at most, whose winding numbers tell that on the surface.
 const LEVELS: usize = 1000;
 
-/// The neighbour whose distance is the spacing of the points.
-const SPACING: usize = 3;
-
 /// Points with normals, arranged for distance queries.
 #[derive(Debug)]
 pub struct SignedDistance {
@@ -54,7 +51,7 @@ impl SignedDistance {
         let neighbours = search.nearest_of_each(&points, winding::NEIGHBOURS);
         let spacings = neighbours
             .par_iter()
-            .map(|found| found[SPACING.min(found.len() - 1)].squared_distance);
+            .map(|found| winding::squared_spacing(found));
         let softening: Vec<f64> = spacings.collect();
         let spacing = (softening.iter().sum::<f64>() / points.len() as f64).sqrt();
         let tree = SummationTree::new(&points, &softening);

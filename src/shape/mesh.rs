@@ -16,6 +16,20 @@ pub(crate) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
+/// The mean of places, summed relative to the first: far from the origin the sums would cancel.
+///
+/// # Panics
+/// If there are none.
+pub(crate) fn mean(places: impl Iterator<Item = [f64; 3]> + Clone) -> [f64; 3] {
+    let mut first = places.clone();
+    let origin = first.next().expect("a place");
+    let count = (first.count() + 1) as f64;
+    places.fold(origin, |mean, place| {
+        let away = difference(place, origin);
+        [0, 1, 2].map(|axis| mean[axis] + away[axis] / count)
+    })
+}
+
 /// `a - b`.
 pub(crate) fn difference(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]

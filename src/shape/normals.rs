@@ -22,14 +22,11 @@ use std::num::NonZeroUsize;
 
 use rayon::prelude::*;
 
-use super::winding::areas;
+use super::winding::{areas, squared_spacing};
 use super::{Neighbour, NeighbourSearch, mesh};
 
 /// Neighbours that the plane is fitted to, the point itself included.
 const NEIGHBOURS: NonZeroUsize = NonZeroUsize::new(12).expect("not zero");
-
-/// The neighbour whose distance is the spacing of the points.
-const SPACING: usize = 3;
 
 /// Squared heights about the fitted plane that a point's place is softened by: two deviations.
 const NOISE: f64 = 4.0;
@@ -55,8 +52,7 @@ pub fn estimate_normals(points: &[[f64; 3]]) -> EstimatedNormals {
     let neighbours = NeighbourSearch::new(points).nearest_of_each(points, NEIGHBOURS);
     let fit = |found: &Vec<Neighbour>| {
         let (normal, variance) = tangent_plane(points, found);
-        let spacing = found[SPACING.min(found.len() - 1)].squared_distance;
-        (normal, spacing + NOISE * variance.max(0.0))
+        (normal, squared_spacing(found) + NOISE * variance.max(0.0))
     };
     let (lines, softening): (Vec<[f64; 3]>, Vec<f64>) = neighbours.par_iter().map(fit).unzip();
     let evidence = evidence::outward(points, &lines, &areas(&neighbours), &softening);
@@ -71,18 +67,10 @@ pub fn estimate_normals(points: &[[f64; 3]]) -> EstimatedNormals {
 /// The direction in which the neighbours spread least, and the variance along it.
 fn tangent_plane(points: &[[f64; 3]], neighbours: &[Neighbour]) -> ([f64; 3], f64) {
     let count = neighbours.len() as f64;
-    // Relative to one of them: far from the origin the sums would cancel.
-    let origin = points[neighbours[0].index as usize];
-    let places = || {
-        neighbours
-            .iter()
-            .map(|found| mesh::difference(points[found.index as usize], origin))
-    };
-    let mean = places().fold([0.0; 3], |sum, x| {
-        [0, 1, 2].map(|axis| sum[axis] + x[axis] / count)
-    });
+    let places = neighbours.iter().map(|found| points[found.index as usize]);
+    let mean = mesh::mean(places.clone());
     let mut covariance = [[0.0; 3]; 3];
-    for place in places() {
+    for place in places {
         let x = mesh::difference(place, mean);
         for row in 0..3 {
             for column in 0..3 {
@@ -176,13 +164,17 @@ mod tests {
         assert!(angle < 3.0, "{angle}");
     }
 
+    /// Points of two unit spheres whose centres lie so far apart, and their normals.
+    fn side_by_side(count: usize, apart: f64, seeds: [u64; 2]) -> (Vec<[f64; 3]>, Vec<[f64; 3]>) {
+        let [left, right] = seeds.map(|seed| sphere_cloud(count, 1.0, seed));
+        let moved = right.iter().map(|n| [n[0] + apart, n[1], n[2]]);
+        let points = left.iter().copied().chain(moved).collect();
+        (points, [left, right].concat())
+    }
+
     #[test]
     fn separate_components_are_each_turned_outwards() {
-        let directions = [sphere_cloud(1000, 1.0, 23), sphere_cloud(1000, 1.0, 24)].concat();
-        let shifted = directions.iter().enumerate();
-        let points: Vec<[f64; 3]> = shifted
-            .map(|(i, n)| [n[0] + if i < 1000 { 0.0 } else { 9.0 }, n[1], n[2]])
-            .collect();
+        let (points, directions) = side_by_side(1000, 9.0, [23, 24]);
         assert_eq!(quality(&points, &directions).0, 1.0);
     }
 
@@ -199,11 +191,7 @@ mod tests {
     fn signs_do_not_cross_between_near_sheets() {
         // Two spheres, 0.03 apart where points lie 0.03 apart: a spanning tree of the tangent planes'
         // agreement turns one of them over.
-        let directions = [sphere_cloud(6000, 1.0, 27), sphere_cloud(6000, 1.0, 28)].concat();
-        let shifted = directions.iter().enumerate();
-        let points: Vec<[f64; 3]> = shifted
-            .map(|(i, n)| [n[0] + if i < 6000 { 0.0 } else { 2.03 }, n[1], n[2]])
-            .collect();
+        let (points, directions) = side_by_side(6000, 2.03, [27, 28]);
         let (outward, _) = quality(&points, &directions);
         // Where they touch, some planes are fitted through both. Measured 0.9987.
         assert!(outward > 0.995, "{outward}");

@@ -34,6 +34,14 @@ const AREA_NEIGHBOURS: usize = 6;
 /// As many as that takes: every point finds itself first.
 pub const NEIGHBOURS: NonZeroUsize = NonZeroUsize::new(AREA_NEIGHBOURS + 1).expect("more than 0");
 
+/// The neighbour whose distance is the spacing of the points.
+const SPACING: usize = 3;
+
+/// The squared spacing about a point whose neighbours, itself first, are these.
+pub fn squared_spacing(found: &[Neighbour]) -> f64 {
+    found[SPACING.min(found.len() - 1)].squared_distance
+}
+
 /// The area that each point stands for: `pi r_k^2 / k` with its k-th neighbour at `r_k`, k = 6.
 ///
 /// `neighbours` are those of each point, itself first; fewer than k are taken as they are.
@@ -52,7 +60,7 @@ pub fn areas(neighbours: &[Vec<Neighbour>]) -> Vec<f64> {
 /// If there are no points.
 pub fn is_inside_out(points: &[[f64; 3]], normals: &[[f32; 3]]) -> bool {
     let neighbours = NeighbourSearch::new(points).nearest_of_each(points, NEIGHBOURS);
-    let centre = mean(points.iter().copied());
+    let centre = mesh::mean(points.iter().copied());
     let discs = areas(&neighbours)
         .into_iter()
         .zip(points.iter().zip(normals));
@@ -60,17 +68,6 @@ pub fn is_inside_out(points: &[[f64; 3]], normals: &[[f32; 3]]) -> bool {
         area * mesh::dot(mesh::difference(point, centre), normal.map(f64::from))
     });
     volume.sum::<f64>() < 0.0
-}
-
-/// The mean of places, summed relative to the first: far from the origin the sums would cancel.
-fn mean(places: impl Iterator<Item = [f64; 3]> + Clone) -> [f64; 3] {
-    let mut first = places.clone();
-    let origin = first.next().expect("a place");
-    let count = (first.count() + 1) as f64;
-    places.fold(origin, |mean, place| {
-        let away = mesh::difference(place, origin);
-        [0, 1, 2].map(|axis| mean[axis] + away[axis] / count)
-    })
 }
 
 /// A group of points that lie together.
@@ -211,7 +208,7 @@ fn fall_off(away: [f64; 3], softening: f64) -> f64 {
 /// them along their longest side.
 fn split(points: &[[f64; 3]], order: &mut [u32], begin: usize, nodes: &mut Vec<Node>) {
     let of = |&k: &u32| points[k as usize];
-    let centre = mean(order.iter().map(of));
+    let centre = mesh::mean(order.iter().map(of));
     let (mut radius, mut reach) = (0.0_f64, [0.0_f64; 3]);
     for point in order.iter().map(of) {
         let away = mesh::difference(point, centre);
@@ -251,7 +248,7 @@ mod tests {
     /// Points with normals, arranged, with their areas and softening lengths.
     fn arranged(points: &[[f64; 3]]) -> (SummationTree, Vec<f64>, Vec<f64>) {
         let neighbours = NeighbourSearch::new(points).nearest_of_each(points, NEIGHBOURS);
-        let softening: Vec<f64> = neighbours.iter().map(|n| n[3].squared_distance).collect();
+        let softening: Vec<f64> = neighbours.iter().map(|n| squared_spacing(n)).collect();
         (
             SummationTree::new(points, &softening),
             areas(&neighbours),
