@@ -13,7 +13,7 @@ const DIFFERENCE: f64 = 2e-3;
 const STEPS_PER_TIME: f64 = 32.0;
 
 /// A surface that changes with time: the zero set of `f(., t)`, negative inside.
-pub trait Geometry<B: ModelBackend>: Sync {
+pub trait Geometry<B: ModelBackend>: Send + Sync {
     /// `f(x, t)`.
     ///
     /// # Shapes
@@ -41,7 +41,7 @@ pub trait Geometry<B: ModelBackend>: Sync {
 
 /// A surface that a flow carries: `f(x, t)` is known from the positions at times 0 and 1 of what is at `x`
 /// at `t`. These vary more smoothly than `f` does, so they can be interpolated where many values are wanted.
-pub trait Carried<B: ModelBackend>: Sync {
+pub trait Carried<B: ModelBackend>: Send + Sync {
     /// How far off the true positions may be, in normalised units, for all but one in twenty near the
     /// surface.
     fn tolerance(&self) -> f64;
@@ -54,9 +54,14 @@ pub trait Carried<B: ModelBackend>: Sync {
 }
 
 /// A map of space from one time to another: it carries points along with the surface.
-pub trait Motion<B: ModelBackend>: Sync {
+pub trait Motion<B: ModelBackend>: Send + Sync {
     /// Where points that are at `x` at time `from` are at time `to`, `[n, 3]` to `[n, 3]`.
     fn carry(&self, x: Tensor<B, 2>, from: f64, to: f64) -> Tensor<B, 2>;
+
+    /// The velocity of what is at `x` at `time`, `[n, 3]`, where the method has one of its own.
+    fn velocity(&self, _x: Tensor<B, 2>, _time: f64) -> Option<Tensor<B, 2>> {
+        None
+    }
 
     /// Where points that are at `x` at time 0 are at each of `times`, which ascend: from each time to the
     /// next, unless the method knows better.

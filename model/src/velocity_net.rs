@@ -107,4 +107,9 @@ impl<B: ModelBackend> Motion<B> for VelocityNet<B> {
     fn carry(&self, x: Tensor<B, 2>, from: f64, to: f64) -> Tensor<B, 2> {
         follow(|x, t| self.forward(x, t), x, from, to)
     }
+
+    fn velocity(&self, x: Tensor<B, 2>, time: f64) -> Option<Tensor<B, 2>> {
+        let t = Tensor::full([x.dims()[0], 1], time, &x.device());
+        Some(self.forward(x, t))
+    }
 }

@@ -6,16 +6,17 @@ use std::io;
 use burn::module::Module;
 use isomorph_model::{Geometry, ImplicitNet, TrainBackend, VelocityNet};
 
-use super::{Method, Rates, Records, Trainee, TrainingData, parts};
-use crate::learner::batch::{self, BatchSizes, Part};
-use crate::learner::checkpoint::{Checkpoint, CheckpointError};
-use crate::learner::event::Phase;
-use crate::learner::motion::Motion;
-use crate::learner::posed::{Posed, Slopes};
-use crate::learner::schedule::Schedule;
-use crate::learner::settings::Settings;
-use crate::learner::step::Step;
+use super::{Method, Trainee};
+use crate::data::TrainingData;
+use crate::motion::Motion;
+use crate::posed::{Posed, Slopes};
+use crate::schedule::Schedule;
+use crate::settings::Settings;
+use crate::network_step::Step;
 use crate::recipe::Recipe;
+use crate::records::{RecordError, Records};
+use crate::report::{Phase, Rates};
+use crate::samples::{self, Batch, BatchSizes, Drawn};
 
 /// The two networks and how they are trained.
 pub(super) struct VelocityField<B: TrainBackend> {
@@ -56,29 +57,33 @@ impl<B: TrainBackend> Method<B> for VelocityField<B> {
     }
 
     fn parts(&self) -> usize {
-        parts::<B>(self.settings.training.batch)
+        samples::parts(self.settings.training.batch)
     }
 
-    fn objective(&self, data: &TrainingData, step: usize, part: Part) -> Posed<B> {
+    fn draw(&self, data: &TrainingData, step: usize) -> Drawn {
         let training = &self.settings.training;
-        let sizes = BatchSizes::new(training, data.pair.correspondences.len(), part.of);
-        let batch = batch::draw(&data.pair, training, sizes, step).part(part);
+        let sizes = BatchSizes::new(training, data);
+        Drawn {
+            batch: Batch::draw(data, training, sizes, step),
+            ..Drawn::default()
+        }
+    }
+
+    fn objective(&self, _: &TrainingData, drawn: &Drawn, step: usize) -> Posed<B> {
         let (f, v) = (self.implicit.replica(), self.velocity.replica());
-        let step = Step {
+        let last_scale = self.settings.loss.matching_scale;
+        let network_step = Step {
             motion: Motion {
                 settings: &self.settings,
-                sizes: sizes.part(part.of),
                 v: &v,
-                matching_scale: self
-                    .schedule
-                    .matching_scale(self.settings.loss.matching_scale, step),
+                matching_scale: self.schedule.matching_scale(last_scale, step),
                 device: &self.device,
             },
             phase: self.schedule.phase(step),
             ramp: self.schedule.ramp(step),
             f: &f,
         };
-        Posed::new(step.objective(&batch)).by(f).by(v)
+        Posed::new(network_step.objective(&drawn.batch)).by(f).by(v)
     }
 
     fn descend(&mut self, step: usize, slopes: &mut Slopes) {
@@ -104,9 +109,9 @@ impl<B: TrainBackend> Method<B> for VelocityField<B> {
         Ok(records)
     }
 
-    fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
-        self.implicit.restore(checkpoint)?;
-        self.velocity.restore(checkpoint)
+    fn restore(&mut self, records: &Records) -> Result<(), RecordError> {
+        self.implicit.restore(records)?;
+        self.velocity.restore(records)
     }
 
     fn geometry(&self) -> Option<Box<dyn Geometry<B::InnerBackend>>> {

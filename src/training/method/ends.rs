@@ -10,14 +10,15 @@ use isomorph_model::baseline::lipmlp::{LipMlp, LipMlpConfig};
 use isomorph_model::baseline::mlp::{PlainMlp, PlainMlpConfig};
 use isomorph_model::{Geometry, Motion, Objective, TrainBackend};
 
-use super::{Method, Rates, Records, Trainee, TrainingData, parts};
-use crate::learner::batch::{self, EndBatch, Part};
-use crate::learner::checkpoint::{Checkpoint, CheckpointError};
-use crate::learner::event::Phase;
-use crate::learner::posed::{Posed, Slopes};
-use crate::learner::schedule::Schedule;
-use crate::learner::settings::{Settings, end_weights};
+use super::{Method, Trainee};
+use crate::data::TrainingData;
+use crate::posed::{Posed, Slopes};
+use crate::schedule::Schedule;
+use crate::settings::{Settings, end_weights};
 use crate::recipe::Recipe;
+use crate::records::{RecordError, Records};
+use crate::report::{Phase, Rates};
+use crate::samples::{self, Drawn, EndBatch};
 use crate::tensors::{column, rows};
 
 /// A network that knows what its step at the ends minimises.
@@ -28,7 +29,7 @@ pub(super) trait EndNet<B: TrainBackend>:
     fn new(recipe: &Recipe, settings: &Settings, device: &B::Device) -> Self;
 
     /// The terms at the samples of one step.
-    fn terms(&self, recipe: &Recipe, settings: &Settings, samples: &Drawn<B>) -> Objective<B>;
+    fn terms(&self, recipe: &Recipe, settings: &Settings, samples: &OnDevice<B>) -> Objective<B>;
 
     /// Whether it learns from signed distances.
     const DISTANCES: bool = false;
@@ -82,13 +83,19 @@ impl<B: TrainBackend, M: EndNet<B>> Method<B> for EndFit<B, M> {
     }
 
     fn parts(&self) -> usize {
-        parts::<B>(self.settings.training.batch)
+        samples::parts(self.settings.training.batch)
     }
 
-    fn objective(&self, data: &TrainingData, step: usize, part: Part) -> Posed<B> {
-        let device = &self.device;
+    fn draw(&self, data: &TrainingData, step: usize) -> Drawn {
+        Drawn {
+            ends: EndBatch::draw(data, &self.settings.training, step),
+            ..Drawn::default()
+        }
+    }
+
+    fn objective(&self, data: &TrainingData, drawn: &Drawn, _: usize) -> Posed<B> {
         let measured = M::DISTANCES || self.settings.loss.distance > 0.0;
-        let drawn = Drawn::new(data, &self.settings, step, part, measured, device);
+        let drawn = OnDevice::new(data, &drawn.ends, measured, &self.device);
         let net = self.net.replica();
         Posed::new(net.terms(&self.recipe, &self.settings, &drawn)).by(net)
     }
@@ -109,8 +116,8 @@ impl<B: TrainBackend, M: EndNet<B>> Method<B> for EndFit<B, M> {
         Ok(records)
     }
 
-    fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
-        self.net.restore(checkpoint)
+    fn restore(&mut self, records: &Records) -> Result<(), RecordError> {
+        self.net.restore(records)
     }
 
     fn geometry(&self) -> Option<Box<dyn Geometry<B::InnerBackend>>> {
@@ -128,7 +135,7 @@ impl<B: TrainBackend> EndNet<B> for PlainMlp<B> {
         PlainMlpConfig { implicit }.init(settings.training.seed, device)
     }
 
-    fn terms(&self, _: &Recipe, settings: &Settings, drawn: &Drawn<B>) -> Objective<B> {
+    fn terms(&self, _: &Recipe, settings: &Settings, drawn: &OnDevice<B>) -> Objective<B> {
         let weights = end_weights(&settings.loss);
         self.objective(&drawn.both(), &weights, &settings.derivatives)
     }
@@ -140,7 +147,7 @@ impl<B: TrainBackend> EndNet<B> for SdfBlend<B> {
         SdfBlendConfig { implicit }.init(settings.training.seed, device)
     }
 
-    fn terms(&self, _: &Recipe, settings: &Settings, drawn: &Drawn<B>) -> Objective<B> {
+    fn terms(&self, _: &Recipe, settings: &Settings, drawn: &OnDevice<B>) -> Objective<B> {
         let weights = end_weights(&settings.loss);
         let [source, target] = drawn.apart();
         self.objective([&source, &target], &weights, &settings.derivatives)
@@ -157,46 +164,44 @@ impl<B: TrainBackend> EndNet<B> for LipMlp<B> {
         config.init(settings.training.seed, device)
     }
 
-    fn terms(&self, recipe: &Recipe, _: &Settings, drawn: &Drawn<B>) -> Objective<B> {
+    fn terms(&self, recipe: &Recipe, _: &Settings, drawn: &OnDevice<B>) -> Objective<B> {
         self.objective(&drawn.both(), recipe.method.lipschitz)
     }
 
     const DISTANCES: bool = true;
 }
 
-/// The samples of a step, on the host, and what they become on the device.
-pub(super) struct Drawn<B: TrainBackend> {
-    pub batch: EndBatch,
-    /// Signed distances of the points in space from the shape of their end, or none.
+/// The samples of a part on the device.
+pub(super) struct OnDevice<'a, B: TrainBackend> {
+    pub batch: &'a EndBatch,
+    /// Signed distances of the points in space from the shape of their key frame, or none.
     distances: Vec<f32>,
     device: B::Device,
 }
 
-impl<B: TrainBackend> Drawn<B> {
+impl<'a, B: TrainBackend> OnDevice<'a, B> {
+    /// With signed distances if `distances` asks for them and every key frame has normals.
     pub(super) fn new(
         data: &TrainingData,
-        settings: &Settings,
-        step: usize,
-        part: Part,
+        batch: &'a EndBatch,
         distances: bool,
         device: &B::Device,
     ) -> Self {
-        let batch = batch::draw_ends(&data.pair, &settings.training, step, part.of).part(part);
-        let known = if distances { data.distances() } else { None };
-        let distances = known.map_or_else(Vec::new, |known| {
-            let points = batch.space.points.iter().zip(&batch.space.times);
-            points
-                .map(|(x, t)| known[usize::from(*t > 0.5)].at(*x))
-                .collect()
-        });
+        let points = batch.space.points.iter().zip(&batch.space.times);
+        let distance = |(x, t): (&[f32; 3], &f32)| data.key_at(*t).around.signed_distance(*x);
+        let known: Option<Vec<f32>> = if distances && data.has_normals() {
+            points.map(distance).collect()
+        } else {
+            None
+        };
         Self {
             batch,
-            distances,
+            distances: known.unwrap_or_default(),
             device: device.clone(),
         }
     }
 
-    /// Both ends together.
+    /// All key frames together.
     pub(super) fn both(&self) -> EndSamples<B> {
         let (surface, space) = (&self.batch.surface.points, &self.batch.space.points);
         self.samples(0..surface.len(), 0..space.len())

@@ -13,15 +13,16 @@ use isomorph_model::baseline::blend::{SdfBlend, SdfBlendConfig};
 use isomorph_model::baseline::nise::{BetweenSamples, Evolution, Nise, NiseConfig, NiseWeights};
 use isomorph_model::{Geometry, ImplicitNetConfig, Motion, TrainBackend};
 
-use super::ends::Drawn;
-use super::{Method, Rates, Records, Trainee, TrainingData, parts};
-use crate::learner::batch::Part;
-use crate::learner::checkpoint::{Checkpoint, CheckpointError};
-use crate::learner::event::Phase;
-use crate::learner::posed::{Posed, Slopes};
-use crate::learner::schedule::Schedule;
-use crate::learner::settings::{Settings, end_weights};
+use super::ends::OnDevice;
+use super::{Method, Trainee};
+use crate::data::TrainingData;
+use crate::posed::{Posed, Slopes};
+use crate::schedule::Schedule;
+use crate::settings::{Settings, end_weights};
 use crate::recipe::{MethodName, MethodRecipe, Recipe};
+use crate::records::{RecordError, Records};
+use crate::report::{Phase, Rates};
+use crate::samples::{self, Drawn, EndBatch};
 use crate::tensors::{column, rows};
 
 /// The end fields and what lies between them.
@@ -108,11 +109,18 @@ impl<B: TrainBackend> Method<B> for Evolved<B> {
     }
 
     fn parts(&self) -> usize {
-        parts::<B>(self.settings.training.batch)
+        samples::parts(self.settings.training.batch)
     }
 
-    fn objective(&self, data: &TrainingData, step: usize, part: Part) -> Posed<B> {
-        let drawn = Drawn::new(data, &self.settings, step, part, false, &self.device);
+    fn draw(&self, data: &TrainingData, step: usize) -> Drawn {
+        Drawn {
+            ends: EndBatch::draw(data, &self.settings.training, step),
+            ..Drawn::default()
+        }
+    }
+
+    fn objective(&self, data: &TrainingData, drawn: &Drawn, step: usize) -> Posed<B> {
+        let drawn = OnDevice::new(data, &drawn.ends, false, &self.device);
         let derivatives = &self.settings.derivatives;
         if self.phase(step) == Phase::Ends {
             let [source, target] = drawn.apart();
@@ -163,9 +171,9 @@ impl<B: TrainBackend> Method<B> for Evolved<B> {
         Ok(records)
     }
 
-    fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
-        self.ends.restore(checkpoint)?;
-        self.net.restore(checkpoint)
+    fn restore(&mut self, records: &Records) -> Result<(), RecordError> {
+        self.ends.restore(records)?;
+        self.net.restore(records)
     }
 
     fn geometry(&self) -> Option<Box<dyn Geometry<B::InnerBackend>>> {

@@ -17,10 +17,10 @@ use isomorph_model::baseline::ends::EndSamples;
 use isomorph_model::loss::data;
 use isomorph_model::{ImplicitNet, Objective, TrainBackend};
 
-use crate::learner::batch::Batch;
-use crate::learner::event::Phase;
-use crate::learner::motion::{Motion, has_priors};
-use crate::learner::settings::end_weights;
+use crate::samples::Batch;
+use crate::report::Phase;
+use crate::motion::{Motion, has_priors};
+use crate::settings::end_weights;
 
 /// What one step is made from.
 pub struct FlowStep<'a, B: TrainBackend> {
@@ -28,6 +28,8 @@ pub struct FlowStep<'a, B: TrainBackend> {
     pub motion: Motion<'a, B>,
     /// Decides which networks train.
     pub phase: Phase,
+    /// Whether the surfaces do not pull on each other yet.
+    pub warms_up: bool,
     /// The share of the weight of the term that takes each surface onto the other.
     pub ramp: f64,
     /// The end fields.
@@ -52,19 +54,17 @@ impl<B: TrainBackend> FlowStep<'_, B> {
     fn motion_terms(&self, batch: &Batch, objective: &mut Objective<B>) {
         let loss = &self.motion.settings.loss;
         let weight = self.ramp * loss.on_surface;
-        let across: Vec<f32> = if weight > 0.0 {
-            batch.starts.times.iter().map(|time| 1.0 - time).collect()
+        let goals = if weight > 0.0 {
+            &batch.goals[..]
         } else {
-            Vec::new()
+            &[]
         };
-        let matching = if self.ramp > 0.0 {
-            loss.matching
-        } else {
+        let matching = if self.warms_up {
             loss.matching_warm_up
+        } else {
+            loss.matching
         };
-        let arrived = self
-            .motion
-            .carry_tracked(batch, &across, matching, objective);
+        let arrived = self.motion.carry_tracked(batch, goals, matching, objective);
         if let Some(arrived) = arrived {
             objective.add("on-surface", weight, || self.distance(arrived));
         }

@@ -1,8 +1,9 @@
 //! Phases, ramps and learning rates: pure functions of the step, so that a resumed run continues on the
 //! same curve.
 
-use crate::learner::event::Phase;
+
 use crate::recipe::{Schedule as Fall, TrainingRecipe};
+use crate::report::Phase;
 
 /// The first scale of the matching term over the last.
 const FIRST_SCALE: f64 = 10.0;
@@ -42,13 +43,15 @@ impl Schedule {
     }
 
     /// The share, 0 to 1, of the weights that tie `f` to `V`: 0 through the warm-up, then a linear ramp
-    /// (the paper, "Warm up training").
+    /// (the paper, "Warm up training"); all of it from the warm-up on where the ramp has no length.
     pub fn ramp(&self, step: usize) -> f64 {
         if step < self.warm_up {
             return 0.0;
         }
-        let span = (self.ramp_until - self.warm_up).max(1) as f64;
-        ((step - self.warm_up) as f64 / span).min(1.0)
+        match self.ramp_until - self.warm_up {
+            0 => 1.0,
+            span => ((step - self.warm_up) as f64 / span as f64).min(1.0),
+        }
     }
 
     /// The scale beyond which the matching term lets go of a pair: from ten times the last one it falls, each
@@ -121,6 +124,9 @@ mod tests {
             [1999, 3500, 5000, 9999].map(|step| paper.ramp(step)),
             [0.0, 0.5, 1.0, 1.0]
         );
+        let steep = ["training.warm-up=0.5", "training.ramp-until=0.5"];
+        let steep = schedule(Preset::Paper, &steep);
+        assert_eq!([4999, 5000].map(|step| steep.ramp(step)), [0.0, 1.0]);
         let rates = [0, 1999, 2000, 9999].map(|step| paper.implicit_rate(step));
         assert_eq!(rates, [5e-3, 5e-3, 2.5e-3, 5e-3 / 16.0]);
     }

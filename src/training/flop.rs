@@ -16,14 +16,16 @@
 use isomorph_model::operators::Derivatives;
 use isomorph_model::trajectory::Integrator;
 
-use super::batch::BatchSizes;
-use super::event::Phase;
-use super::motion::{has_priors, needs_rate};
-use super::settings::Settings;
+use crate::motion::{has_priors, needs_rate};
 use crate::recipe::GeometryKind;
+use crate::report::Phase;
+use crate::samples::BatchSizes;
+use crate::settings::Settings;
 
 /// The operations of one step in a phase.
-pub fn per_step(settings: &Settings, sizes: BatchSizes, phase: Phase) -> f64 {
+///
+/// `keys`: how many key frames the data has.
+pub fn per_step(settings: &Settings, sizes: BatchSizes, keys: usize, phase: Phase) -> f64 {
     let unit_f = settings.implicit.mlp().flop_per_point();
     let unit_v = settings.velocity.mlp().flop_per_point();
     let loss = &settings.loss;
@@ -35,7 +37,7 @@ pub fn per_step(settings: &Settings, sizes: BatchSizes, phase: Phase) -> f64 {
         Integrator::Rk4 => 4,
     };
     let evaluations = (settings.steps.count() * stages) as f64;
-    let carried = 2.0 * sizes.carried as f64;
+    let carried = (keys * sizes.carried) as f64;
     let matched = 2.0 * sizes.matched as f64;
     let collocation = (sizes.band + sizes.uniform) as f64;
 
@@ -65,7 +67,7 @@ pub fn per_step(settings: &Settings, sizes: BatchSizes, phase: Phase) -> f64 {
     let of_f = match (flow, trains_f) {
         // The value where points arrive, derived by their places alone.
         (true, _) => 6.0 * settings.training.batch as f64 + 2.0 * (tracked - matched).max(0.0),
-        (false, true) => 6.0 * sizes.total() as f64,
+        (false, true) => 6.0 * ((keys * sizes.ends) as f64 + carried + collocation),
         (false, false) => 0.0,
     };
     unit_v * of_v + unit_f * of_f

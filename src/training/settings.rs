@@ -1,4 +1,4 @@
-//! From the recipe's words to the model's types: what the learner is told, in one place.
+//! From the recipe's words to the model's types: in one place.
 
 use isomorph_model::activation::Activation;
 use isomorph_model::baseline::ends::EndWeights;
@@ -7,7 +7,6 @@ use isomorph_model::trajectory::{Integrator, Steps};
 use isomorph_model::{ImplicitNetConfig, VelocityNetConfig};
 
 use crate::recipe::{self, GeometryKind, LossRecipe, Recipe, TrainingRecipe};
-use crate::shape::{self, Correspondences};
 
 /// Everything that shapes a step, in the model's types.
 #[derive(Clone, Debug)]
@@ -99,33 +98,5 @@ fn activation(kind: recipe::Activation, beta: f64) -> Activation {
     match kind {
         recipe::Activation::Softplus => Activation::Softplus { beta },
         recipe::Activation::Sine => Activation::Sine { omega: beta },
-    }
-}
-
-/// What the recipe says of the shapes; `found` are the pairs where it has them found
-/// ([`recipe::Correspondences::Match`]), and of no account where it names others.
-pub fn data(recipe: &Recipe, found: Option<Correspondences>) -> shape::DataOptions {
-    let section = &recipe.data;
-    shape::DataOptions {
-        source: section.source.clone(),
-        target: section.target.clone(),
-        correspondences: match &section.correspondences {
-            recipe::Correspondences::None => shape::CorrespondenceSource::None,
-            recipe::Correspondences::SameVertices => shape::CorrespondenceSource::SameVertices,
-            recipe::Correspondences::Match => found.map_or(
-                shape::CorrespondenceSource::None,
-                shape::CorrespondenceSource::Pairs,
-            ),
-            recipe::Correspondences::File(path) => shape::CorrespondenceSource::File(path.clone()),
-        },
-        points: section.points,
-        correspondence_fraction: section.correspondence_fraction,
-        normals: match section.normals {
-            recipe::NormalSource::Auto => shape::NormalSource::Auto,
-            recipe::NormalSource::Given => shape::NormalSource::Given,
-            recipe::NormalSource::Estimate => shape::NormalSource::Estimate,
-            recipe::NormalSource::None => shape::NormalSource::None,
-        },
-        seed: recipe.training.seed,
     }
 }

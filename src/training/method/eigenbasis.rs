@@ -8,14 +8,14 @@ use isomorph_model::baseline::eigenbasis::{Eigenbasis, EigenbasisConfig, Eigenba
 use isomorph_model::trajectory::{Integrator, Steps};
 use isomorph_model::{Geometry, Motion, TrainBackend};
 
-use super::{Method, Rates, Records, Trainee, TrainingData};
-use crate::learner::batch::{self, Part};
-use crate::learner::checkpoint::{Checkpoint, CheckpointError};
-use crate::learner::event::Phase;
-use crate::learner::posed::{Posed, Slopes};
-use crate::learner::schedule::Schedule;
+use super::{Method, Trainee};
+use crate::posed::{Posed, Slopes};
+use crate::schedule::Schedule;
 use crate::recipe::{Recipe, TrainingRecipe};
-use crate::shape::Bounds;
+use crate::data::{Bounds, TrainingData};
+use crate::records::{RecordError, Records};
+use crate::report::{Phase, Rates};
+use crate::samples::Drawn;
 use crate::tensors::rows;
 
 /// Steps of the integrator between two times: the field is fixed, and as smooth as its highest mode.
@@ -72,9 +72,16 @@ impl<B: TrainBackend> Method<B> for Flow<B> {
         }
     }
 
-    fn objective(&self, data: &TrainingData, step: usize, _: Part) -> Posed<B> {
-        let (from, to) = batch::draw_matched(&data.pair, &self.training, step);
-        let (x0, x1) = (rows(&from, &self.device), rows(&to, &self.device));
+    fn draw(&self, data: &TrainingData, step: usize) -> Drawn {
+        Drawn::matched(data, &self.training, step)
+    }
+
+    fn objective(&self, _: &TrainingData, drawn: &Drawn, _: usize) -> Posed<B> {
+        let pairs = &drawn.batch.matched;
+        let (x0, x1) = (
+            rows(&pairs.sources, &self.device),
+            rows(&pairs.targets, &self.device),
+        );
         let net = self.net.replica();
         Posed::new(net.objective(x0, x1, &self.weights)).by(net)
     }
@@ -94,8 +101,8 @@ impl<B: TrainBackend> Method<B> for Flow<B> {
         Ok(records)
     }
 
-    fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
-        self.net.restore(checkpoint)
+    fn restore(&mut self, records: &Records) -> Result<(), RecordError> {
+        self.net.restore(records)
     }
 
     fn geometry(&self) -> Option<Box<dyn Geometry<B::InnerBackend>>> {

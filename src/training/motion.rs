@@ -1,4 +1,4 @@
-//! What a step asks of the Velocity-Net: trajectories, the matching term, and the priors. The same for
+//! What a step needs of the Velocity-Net: trajectories, the matching term, and the priors. The same for
 //! both geometries.
 
 use burn::module::AutodiffModule;
@@ -10,9 +10,9 @@ use isomorph_model::operators::{Operators, VelocityJet, VelocityRequest, transpo
 use isomorph_model::trajectory::integrate;
 use isomorph_model::{Objective, TrainBackend, VelocityNet};
 
-use crate::learner::batch::{Batch, BatchSizes};
-use crate::learner::settings::Settings;
 use crate::recipe::LossRecipe;
+use crate::samples::Batch;
+use crate::settings::Settings;
 use crate::tensors::{column, rows};
 
 /// The Velocity-Net in one step.
@@ -20,8 +20,6 @@ use crate::tensors::{column, rows};
 pub struct Motion<'a, B: TrainBackend> {
     /// Weights and methods.
     pub settings: &'a Settings,
-    /// How many samples of each kind.
-    pub sizes: BatchSizes,
     /// The Velocity-Net.
     pub v: &'a VelocityNet<B>,
     /// The scale of the matching term in this step; 0 is the plain distance.
@@ -45,6 +43,8 @@ pub struct Collocation<B: TrainBackend> {
     pub x: Tensor<B, 2>,
     /// `[n, 1]`.
     pub t: Tensor<B, 2>,
+    /// How many of them are the band.
+    pub band: usize,
     /// The normals of the carried points that the band lies around, `[band, 3]`, if they are known.
     pub normals: Option<Tensor<B, 2>>,
 }
@@ -64,11 +64,12 @@ impl<B: TrainBackend> Motion<'_, B> {
         weight: f64,
         objective: &mut Objective<B>,
     ) -> Option<Tensor<B, 2>> {
-        let matched = self.sizes.matched;
-        let (sources, targets) = &batch.matched;
-        let mut x = [&sources[..], targets].concat();
-        let mut from = [vec![0.0; matched], vec![1.0; matched]].concat();
-        let mut to = [vec![1.0; matched], vec![0.0; matched]].concat();
+        let pairs = &batch.matched;
+        let matched = pairs.len();
+        // Each pair both ways: the error of a path is not the same from either end.
+        let mut x = [&pairs.sources[..], &pairs.targets].concat();
+        let mut from = [&pairs.from[..], &pairs.to].concat();
+        let mut to = [&pairs.to[..], &pairs.from].concat();
         if !stops.is_empty() {
             x.extend(&batch.starts.points);
             from.extend(&batch.starts.times);
@@ -83,7 +84,7 @@ impl<B: TrainBackend> Motion<'_, B> {
         let arrived = integrate(rhs, self.rows(&x), from, to, steps, integrator);
         if matched > 0 {
             objective.add("matching", weight, || {
-                let marks = self.rows(&[&targets[..], sources].concat());
+                let marks = self.rows(&[&pairs.targets[..], &pairs.sources].concat());
                 let there = arrived.clone().slice([0..2 * matched, 0..3]);
                 matching::matching(there, marks, self.matching_scale)
             });
@@ -119,7 +120,7 @@ impl<B: TrainBackend> Motion<'_, B> {
 
     /// The collocation points of a batch whose carried points are `still`.
     pub fn collocation(&self, batch: &Batch, still: &Still<B>) -> Collocation<B> {
-        let (band, count) = (self.sizes.band, 2 * self.sizes.carried);
+        let (band, count) = (batch.offsets.len(), batch.starts.points.len());
         let repeats = band.div_ceil(count).max(1);
         let around = |carried: Tensor<B::InnerBackend, 2>| {
             let [_, columns] = carried.dims();
@@ -134,13 +135,14 @@ impl<B: TrainBackend> Motion<'_, B> {
             t.push(around(column(&batch.stops, self.device)));
             normals = still.normals.clone().map(around);
         }
-        if self.sizes.uniform > 0 {
+        if !batch.uniform.points.is_empty() {
             x.push(self.rows(&batch.uniform.points));
             t.push(column(&batch.uniform.times, self.device));
         }
         Collocation {
             x: Tensor::cat(x, 0),
             t: Tensor::cat(t, 0),
+            band,
             normals,
         }
     }
@@ -172,8 +174,8 @@ impl<B: TrainBackend> Motion<'_, B> {
         objective.add("steadiness", loss.steadiness, || {
             steadiness::steadiness(&jet)
         });
-        if self.sizes.band > 0 {
-            self.band_priors(&jet.first(self.sizes.band), at, objective);
+        if at.band > 0 {
+            self.band_priors(&jet.first(at.band), at, objective);
         }
         Some(jet)
     }

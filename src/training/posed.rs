@@ -4,7 +4,7 @@ use burn::module::AutodiffModule;
 use burn::optim::GradientsParams;
 use isomorph_model::{Objective, TrainBackend};
 
-use super::event::TermReport;
+use crate::report::TermReport;
 
 /// Takes the gradients of one network out of those of a graph.
 type Collect<B> = Box<

@@ -10,13 +10,14 @@ use isomorph_model::baseline::nfgp::{
 };
 use isomorph_model::{Geometry, Motion, TrainBackend};
 
-use super::{Method, Rates, Records, Trainee, TrainingData};
-use crate::learner::batch::{self, Part};
-use crate::learner::checkpoint::{Checkpoint, CheckpointError};
-use crate::learner::event::Phase;
-use crate::learner::posed::{Posed, Slopes};
-use crate::learner::schedule::Schedule;
+use super::{Method, Trainee};
+use crate::data::TrainingData;
+use crate::posed::{Posed, Slopes};
+use crate::schedule::Schedule;
 use crate::recipe::{Recipe, TrainingRecipe};
+use crate::records::{RecordError, Records};
+use crate::report::{Phase, Rates};
+use crate::samples::{Drawn, Neighbouring};
 use crate::tensors::rows;
 
 /// The deformations and the one in work.
@@ -84,20 +85,21 @@ impl<B: TrainBackend> Method<B> for Deformations<B> {
         }
     }
 
-    fn objective(&self, data: &TrainingData, step: usize, _: Part) -> Posed<B> {
+    fn draw(&self, data: &TrainingData, step: usize) -> Drawn {
+        Drawn {
+            neighbours: Neighbouring::draw(&data.keys[0], &self.training, step),
+            ..Drawn::matched(data, &self.training, step)
+        }
+    }
+
+    fn objective(&self, _: &TrainingData, drawn: &Drawn, step: usize) -> Posed<B> {
         let (index, ..) = self.turn(step);
         let time = self.done.net.time(index);
-        let (handles, ends) = batch::draw_matched(&data.pair, &self.training, step);
-        let drawn = batch::draw_neighbours(
-            &data.pair.source,
-            data.source_search(),
-            &self.training,
-            step,
-        );
+        let (pairs, drawn) = (&drawn.batch.matched, &drawn.neighbours);
         let tensor = |points: &[[f32; 3]]| rows(points, &self.device);
         let samples = NfgpSamples {
-            handles: tensor(&handles),
-            marks: straight_lines(tensor(&handles), tensor(&ends), time),
+            handles: tensor(&pairs.sources),
+            marks: straight_lines(tensor(&pairs.sources), tensor(&pairs.targets), time),
             points: tensor(&drawn.points),
             normals: tensor(&drawn.normals),
             neighbours: tensor(&drawn.neighbours),
@@ -129,9 +131,9 @@ impl<B: TrainBackend> Method<B> for Deformations<B> {
         Ok(records)
     }
 
-    fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
-        self.work.restore(checkpoint)?;
-        self.done.restore(checkpoint)
+    fn restore(&mut self, records: &Records) -> Result<(), RecordError> {
+        self.work.restore(records)?;
+        self.done.restore(records)
     }
 
     fn geometry(&self) -> Option<Box<dyn Geometry<B::InnerBackend>>> {

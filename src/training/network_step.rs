@@ -11,9 +11,9 @@ use isomorph_model::loss::{data, eikonal, level_set, normals, off_surface};
 use isomorph_model::operators::{Operators, VelocityJet};
 use isomorph_model::{ImplicitNet, Objective, TrainBackend};
 
-use crate::learner::batch::Batch;
-use crate::learner::event::Phase;
-use crate::learner::motion::{Collocation, Motion, Still, has_normals};
+use crate::samples::Batch;
+use crate::report::Phase;
+use crate::motion::{Collocation, Motion, Still, has_normals};
 use crate::recipe::LevelSetForm;
 use crate::tensors::{column, rows};
 
@@ -106,14 +106,11 @@ impl<B: TrainBackend> Step<'_, B> {
         objective: &mut Objective<B>,
     ) {
         let Motion {
-            settings,
-            sizes,
-            device,
-            ..
+            settings, device, ..
         } = self.motion;
         let loss = &settings.loss;
         let ends = batch.ends.points.len();
-        let collocation = at.x.dims()[0];
+        let (band, collocation) = (at.band, at.x.dims()[0]);
         let end_points = rows(&batch.ends.points, device);
         let end_times = column(&batch.ends.times, device);
         let x = Tensor::cat(vec![end_points, at.x, carried.positions.clone()], 0);
@@ -151,10 +148,9 @@ impl<B: TrainBackend> Step<'_, B> {
                 normals::normals(&at_carried, carried_normals.clone())
             });
         }
-        if sizes.uniform > 0 {
+        if band < collocation {
             objective.add("off-surface", loss.off_surface, || {
-                let (start, end) = (sizes.band, collocation);
-                off_surface::off_surface(at_collocation.rows(start, end).value)
+                off_surface::off_surface(at_collocation.rows(band, collocation).value)
             });
         }
     }

@@ -7,18 +7,18 @@ use burn::module::Module;
 use isomorph_model::baseline::blend::{SdfBlend, SdfBlendConfig};
 use isomorph_model::{FlowGeometry, Geometry, TrainBackend, VelocityNet};
 
-use super::ends::Drawn;
-use super::{Method, Rates, Records, Trainee, TrainingData, parts};
-use crate::learner::batch::{self, BatchSizes, Part};
-use crate::learner::checkpoint::{Checkpoint, CheckpointError};
-use crate::learner::event::Phase;
-use crate::learner::flow_step::FlowStep;
-use crate::learner::motion::Motion;
-use crate::learner::posed::{Posed, Slopes};
-use crate::learner::schedule::Schedule;
-use crate::learner::settings::Settings;
+use super::ends::OnDevice;
+use super::{Method, Trainee};
+use crate::flow_step::FlowStep;
+use crate::motion::Motion;
+use crate::posed::{Posed, Slopes};
+use crate::schedule::Schedule;
+use crate::settings::Settings;
 use crate::recipe::Recipe;
-use crate::shape::Bounds;
+use crate::data::{Bounds, TrainingData};
+use crate::records::{RecordError, Records};
+use crate::report::{Phase, Rates};
+use crate::samples::{self, Batch, BatchSizes, Drawn, EndBatch};
 use crate::tensors::rows;
 
 /// Points to a side of the lattice that decides how finely the geometry follows the flow.
@@ -74,32 +74,42 @@ impl<B: TrainBackend> Method<B> for Flow<B> {
     }
 
     fn parts(&self) -> usize {
-        parts::<B>(self.settings.training.batch)
+        samples::parts(self.settings.training.batch)
     }
 
-    fn objective(&self, data: &TrainingData, step: usize, part: Part) -> Posed<B> {
+    fn draw(&self, data: &TrainingData, step: usize) -> Drawn {
+        let training = &self.settings.training;
+        let sizes = BatchSizes {
+            // The end fields have samples of their own.
+            ends: 0,
+            ..BatchSizes::new(training, data)
+        };
+        Drawn {
+            batch: Batch::draw(data, training, sizes, step),
+            ends: EndBatch::draw(data, training, step),
+            ..Drawn::default()
+        }
+    }
+
+    fn objective(&self, data: &TrainingData, drawn: &Drawn, step: usize) -> Posed<B> {
         let (settings, device) = (&self.settings, &self.device);
-        let training = &settings.training;
-        let sizes = BatchSizes::new(training, data.pair.correspondences.len(), part.of);
-        let batch = batch::draw(&data.pair, training, sizes, step).part(part);
         let measured = settings.loss.distance > 0.0;
-        let [source, target] = Drawn::new(data, settings, step, part, measured, device).apart();
+        let [source, target] = OnDevice::new(data, &drawn.ends, measured, device).apart();
         let (ends, v) = (self.ends.replica(), self.velocity.replica());
-        let step = FlowStep {
+        let last_scale = settings.loss.matching_scale;
+        let flow_step = FlowStep {
             motion: Motion {
                 settings,
-                sizes: sizes.part(part.of),
                 v: &v,
-                matching_scale: self
-                    .schedule
-                    .matching_scale(settings.loss.matching_scale, step),
+                matching_scale: self.schedule.matching_scale(last_scale, step),
                 device,
             },
             phase: self.phase(step),
+            warms_up: self.schedule.phase(step) == Phase::WarmUp,
             ramp: self.schedule.ramp(step),
             ends: &ends,
         };
-        Posed::new(step.objective(&batch, [&source, &target]))
+        Posed::new(flow_step.objective(&drawn.batch, [&source, &target]))
             .by(ends)
             .by(v)
     }
@@ -125,9 +135,9 @@ impl<B: TrainBackend> Method<B> for Flow<B> {
         Ok(records)
     }
 
-    fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
-        self.ends.restore(checkpoint)?;
-        self.velocity.restore(checkpoint)
+    fn restore(&mut self, records: &Records) -> Result<(), RecordError> {
+        self.ends.restore(records)?;
+        self.velocity.restore(records)
     }
 
     fn geometry(&self) -> Option<Box<dyn Geometry<B::InnerBackend>>> {

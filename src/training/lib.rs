@@ -1,0 +1,53 @@
+//! Training: what a recipe says, the samples of a step, the methods and what a step of each minimises.
+//!
+//! All of it is generic over the burn backend and compiled once for each in a package of its own
+//! (`flex/`, `ndarray/`, `wgpu/`), behind a border without type parameters: an [`engine::Engine`] gives a
+//! [`engine::Trainer`], and that gives a [`deformation::Deformation`]. What stands above the border is not
+//! compiled again when a backend changes, and no backend is compiled again when that changes.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | `recipe/` | the TOML file that decides a run, typed, checked and printed back |
+//! | `data.rs` | key frames as points: what methods draw their samples from |
+//! | `samples.rs` | the samples of a step, on the host, and their equal parts |
+//! | `method/` | what is trained: the default method and those that it is compared with, one file each |
+//! | `settings.rs` | the recipe in the model's types |
+//! | `schedule.rs` | phases, ramp and learning rates by step |
+//! | `motion.rs` | what a step needs of `V`: trajectories, matching, regularisers |
+//! | `flow_step.rs` | the objective of a step with end fields that the flow carries |
+//! | `network_step.rs` | the same with `f(x, t)` in one network |
+//! | `posed.rs` | the objective of a part, its terms and its gradients |
+//! | `optimiser.rs` | Adam with a limited gradient |
+//! | `records.rs` | networks and optimiser states as bytes |
+//! | `engine.rs` | the border to training: a backend without its type |
+//! | `deformation.rs` | the border to what was trained: values and motion of points on the host |
+//! | `report.rs` | phases and terms, as they are reported |
+//! | `flop.rs` | what a step costs |
+//! | `workers.rs`, `tensors.rs` | cores, and tensors from and to the host |
+//!
+//! Nothing here knows a file, a clock or a terminal.
+
+// The thrice lifted autodiff types nest deeper than the default limit allows.
+#![recursion_limit = "256"]
+
+pub mod data;
+pub mod deformation;
+pub mod engine;
+pub mod flop;
+mod flow_step;
+pub mod method;
+mod motion;
+mod network_step;
+mod optimiser;
+mod posed;
+pub mod recipe;
+pub mod records;
+pub mod report;
+pub mod samples;
+pub mod schedule;
+pub mod settings;
+mod tensors;
+mod workers;
+
+#[cfg(test)]
+mod tests;
