@@ -1,56 +1,46 @@
-//! The backends by name: the only file that names a concrete one.
-//!
-//! A [`Task`] is generic over the backend; [`run`] runs it on the one that a user chose. Each task is
-//! compiled once per backend, which is most of the build: there are few.
+//! The backends by value: where networks are trained and evaluated.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::{Arc, Mutex};
+use std::fmt;
+use std::str::FromStr;
 
-use burn::tensor::Tensor;
-use burn::tensor::backend::Backend;
-use burn_autodiff::Autodiff;
-use clap::ValueEnum;
-use isomorph_model::TrainBackend;
+use isomorph_training::engine::{DeviceError, Engine};
 
-/// Where networks are evaluated and trained.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum BackendName {
+use crate::error::Error;
+
+/// Where networks are trained and evaluated. All backends run the same code and agree within the rounding
+/// of single precision.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum Backend {
     /// burn-ndarray: any CPU.
     Ndarray,
-    /// burn-flex: CPUs, with the faster matrix products.
+    /// burn-flex: CPUs, with the faster matrix products. The fastest that runs on every machine.
+    #[default]
     Flex,
     /// burn-wgpu: GPUs, through Vulkan.
-    Wgpu,
-}
-
-impl BackendName {
-    /// The feature that compiles it in, which is also its name.
-    pub const fn feature(self) -> &'static str {
-        match self {
-            Self::Ndarray => "ndarray",
-            Self::Flex => "flex",
-            Self::Wgpu => "wgpu",
-        }
-    }
+    Wgpu {
+        /// `default`, `cpu`, or a kind of GPU with an optional number, as in `discrete:1`; `None` is the
+        /// default one.
+        device: Option<String>,
+    },
 }
 
 /// Why a backend cannot be used.
 #[derive(Debug, thiserror::Error)]
-pub enum BackendError {
+pub(crate) enum BackendError {
     /// Not part of this build.
-    #[error("--backend {0}: not compiled in; build with `--features {0}`")]
+    #[error("backend {0}: not compiled in; build with the feature {0}")]
     Absent(&'static str),
     /// The device has another name or number.
-    #[error("--device {found}: {allowed}")]
+    #[error("device {found}: {allowed}")]
     Device {
-        /// What was asked for.
+        /// What was requested.
         found: String,
         /// What there is.
         allowed: &'static str,
     },
     /// The driver gave no device.
     #[error(
-        "--backend {backend}: no device could be opened ({problem}); install a GPU driver (or mesa-vulkan-drivers for one in software), or use --backend ndarray"
+        "backend {backend}: {problem}; install a GPU driver (or mesa-vulkan-drivers for one in software), or use the backend flex"
     )]
     NoDevice {
         /// The backend.
@@ -60,114 +50,101 @@ pub enum BackendError {
     },
 }
 
-/// Something to be done on whichever backend was chosen.
-pub trait Task {
-    /// What it results in.
-    type Output;
+impl Backend {
+    /// The names of all backends, compiled in or not.
+    pub const NAMES: [&'static str; 3] = ["ndarray", "flex", "wgpu"];
 
-    /// Does it.
-    fn run<B: TrainBackend>(self, device: B::Device) -> Self::Output;
-}
+    /// Its name, which is also that of the feature that compiles it in.
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::Ndarray => "ndarray",
+            Self::Flex => "flex",
+            Self::Wgpu { .. } => "wgpu",
+        }
+    }
 
-/// Runs a task on a backend; `device` is a device's name there, or `None` for the default one.
-///
-/// # Errors
-/// [`BackendError`] if the backend is not compiled in or its device cannot be opened.
-pub fn run<T: Task>(
-    backend: BackendName,
-    device: Option<&str>,
-    task: T,
-) -> Result<T::Output, BackendError> {
-    match backend {
-        #[cfg(feature = "ndarray")]
-        BackendName::Ndarray => {
-            only_cpu(device)?;
-            Ok(task.run::<Autodiff<burn_ndarray::NdArray>>(Default::default()))
+    /// The same backend on a device of this name.
+    ///
+    /// # Errors
+    /// A CPU backend has one device only, `cpu` or `default`.
+    pub fn on(self, device: &str) -> Result<Self, Error> {
+        match self {
+            Self::Wgpu { .. } => Ok(Self::Wgpu {
+                device: Some(device.to_owned()),
+            }),
+            _ if matches!(device, "default" | "cpu") => Ok(self),
+            _ => Err(BackendError::Device {
+                found: device.to_owned(),
+                allowed: "this backend has one device, cpu; devices are chosen with the backend wgpu",
+            }
+            .into()),
         }
-        #[cfg(feature = "flex")]
-        BackendName::Flex => {
-            only_cpu(device)?;
-            Ok(task.run::<Autodiff<burn_flex::Flex>>(Default::default()))
+    }
+
+    /// Opens its device.
+    pub(crate) fn open(&self) -> Result<Box<dyn Engine>, BackendError> {
+        match self {
+            #[cfg(feature = "ndarray")]
+            Self::Ndarray => Ok(isomorph_training_ndarray::engine()),
+            #[cfg(feature = "flex")]
+            Self::Flex => Ok(isomorph_training_flex::engine()),
+            #[cfg(feature = "wgpu")]
+            Self::Wgpu { device } => {
+                isomorph_training_wgpu::engine(device.as_deref()).map_err(refused)
+            }
+            #[allow(unreachable_patterns, reason = "reachable where a feature is off")]
+            absent => Err(BackendError::Absent(absent.name())),
         }
-        #[cfg(feature = "wgpu")]
-        BackendName::Wgpu => {
-            let device = wgpu_device(device)?;
-            opens::<burn_wgpu::Wgpu>("wgpu", &device)?;
-            Ok(task.run::<Autodiff<burn_wgpu::Wgpu>>(device))
-        }
-        #[allow(unreachable_patterns, reason = "reachable where a feature is off")]
-        absent => Err(BackendError::Absent(absent.feature())),
     }
 }
 
-/// Opens a backend's device and does nothing with it: so that what cannot work fails early.
-///
-/// # Errors
-/// Those of [`run`].
-pub fn check(backend: BackendName, device: Option<&str>) -> Result<(), BackendError> {
-    struct Nothing;
-    impl Task for Nothing {
-        type Output = ();
-        fn run<B: TrainBackend>(self, _: B::Device) {}
-    }
-    run(backend, device, Nothing)
-}
-
-fn only_cpu(device: Option<&str>) -> Result<(), BackendError> {
-    match device {
-        None | Some("default" | "cpu") => Ok(()),
-        Some(other) => Err(BackendError::Device {
-            found: other.to_owned(),
-            allowed: "this backend has one device, cpu; devices are chosen with --backend wgpu",
-        }),
+#[cfg_attr(not(feature = "wgpu"), allow(dead_code, reason = "of wgpu alone"))]
+fn refused(error: DeviceError) -> BackendError {
+    match error {
+        DeviceError::Name { found, allowed } => BackendError::Device { found, allowed },
+        DeviceError::None(_) => BackendError::NoDevice {
+            backend: "wgpu",
+            problem: error.to_string(),
+        },
     }
 }
 
-/// `default`, `cpu`, or a kind of GPU with an optional number: `discrete:1`.
-#[cfg(feature = "wgpu")]
-fn wgpu_device(name: Option<&str>) -> Result<burn_wgpu::WgpuDevice, BackendError> {
-    use burn_wgpu::WgpuDevice;
-    let name = name.unwrap_or("default");
-    let (kind, number) = name.split_once(':').unwrap_or((name, "0"));
-    let device = match (kind, number.parse::<usize>()) {
-        ("default", Ok(0)) => Some(WgpuDevice::DefaultDevice),
-        ("cpu", Ok(0)) => Some(WgpuDevice::Cpu),
-        ("discrete", Ok(number)) => Some(WgpuDevice::DiscreteGpu(number)),
-        ("integrated", Ok(number)) => Some(WgpuDevice::IntegratedGpu(number)),
-        ("virtual", Ok(number)) => Some(WgpuDevice::VirtualGpu(number)),
-        _ => None,
-    };
-    device.ok_or_else(|| BackendError::Device {
-        found: name.to_owned(),
-        allowed: "must be default, cpu, discrete, integrated or virtual, the last three with an \
-                  optional number, as in discrete:1",
-    })
+impl fmt::Display for Backend {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.pad(self.name())
+    }
 }
 
-/// Opens the device and makes one value there: drivers that are missing make burn-wgpu panic.
-fn opens<B: Backend>(backend: &'static str, device: &B::Device) -> Result<(), BackendError> {
-    // The first panic, on whichever thread, says why; those that follow only pass it on.
-    let first = Arc::new(Mutex::new(None));
-    let seen = Arc::clone(&first);
-    let hook = std::panic::take_hook();
-    std::panic::set_hook(Box::new(move |panic| {
-        let text = panic
-            .payload_as_str()
-            .unwrap_or("the driver gave no reason");
-        if let Ok(mut first) = seen.lock() {
-            first.get_or_insert_with(|| text.lines().next().unwrap_or_default().to_owned());
+impl FromStr for Backend {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self, Error> {
+        match name {
+            "ndarray" => Ok(Self::Ndarray),
+            "flex" => Ok(Self::Flex),
+            "wgpu" => Ok(Self::Wgpu { device: None }),
+            _ => Err(Error::usage(format!(
+                "backend {name}: must be one of {}",
+                Self::NAMES.join(", ")
+            ))),
         }
-    }));
-    let opened = catch_unwind(AssertUnwindSafe(|| {
-        Tensor::<B, 1>::ones([1], device).into_data();
-    }));
-    std::panic::set_hook(hook);
-    opened.map_err(|_| {
-        let problem = first
-            .lock()
-            .ok()
-            .and_then(|mut first| first.take())
-            .unwrap_or_default();
-        BackendError::NoDevice { backend, problem }
-    })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_read_back_and_devices_belong_to_wgpu() {
+        for name in Backend::NAMES {
+            let backend: Backend = name.parse().expect("a name");
+            assert_eq!(backend.to_string(), name);
+        }
+        let text = "gpu".parse::<Backend>().expect_err("none").to_string();
+        assert_eq!(text, "backend gpu: must be one of ndarray, flex, wgpu");
+        assert_eq!(Backend::Flex.on("cpu").expect("its own"), Backend::Flex);
+        let text = Backend::Flex.on("discrete:1").expect_err("a GPU").to_string();
+        assert!(text.contains("discrete:1") && text.contains("wgpu"), "{text}");
+    }
 }

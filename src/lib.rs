@@ -1,25 +1,89 @@
-//! isomorph learns a continuous deformation between two shapes: a time-varying neural signed distance
-//! field carried by an explicit velocity field. This library is all of the program but its `main`.
+//! isomorph learns a continuous deformation between 3D shapes: a time-varying signed distance field carried
+//! by an explicit velocity field.
 //!
-//! A reader's path: `main.rs`, [`cli`] (`train.rs`), [`learner`] (`mod.rs`, `step.rs`), then the terms and
-//! operators in [`isomorph_model`]. Arrows run one way: `cli -> learner -> model`,
-//! `cli -> surface -> model`, `cli -> evaluate -> shape`, `cli -> matching -> shape`,
-//! `cli -> compare -> evaluate`.
+//! ```no_run
+//! use isomorph::{Backend, Recipe, Session};
+//!
+//! # fn main() -> Result<(), isomorph::Error> {
+//! let recipe = Recipe::between("a.ply".as_ref(), "b.ply".as_ref())?;
+//! let mut session = Session::prepare(recipe, "runs/pair", Backend::Flex)?;
+//! let trained = session.train(|event| println!("{event}"))?;
+//! let half_way = trained.surface(0.5, 192)?;
+//! println!("{} triangles", half_way.triangles.len());
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! | item | what it is |
+//! |---|---|
+//! | [`Recipe`] | all that decides a run, from a TOML file or made here |
+//! | [`Shape`], [`Keyframes`] | meshes and point clouds; two or more of them made ready for training |
+//! | [`Session`] | a run in training: prepared, trained, resumed, stopped |
+//! | [`Trained`] | a run that is opened: surfaces, distances, velocities, carried points |
+//! | [`Event`] | what is reported while work goes on; front ends show it |
+//! | [`Backend`] | where networks are trained and evaluated, chosen by value |
+//! | [`Error`] | one type for all that can go wrong; its [`ErrorKind`] decides the exit status |
+//! | [`correspondence`], [`normals`], [`evaluation`], [`comparison`], [`benchmark`] | pairs and normals found; runs, methods and machines measured |
+//! | [`guide`] | the guide: first steps, recipes, results, method, design |
+//!
+//! The command line is one front end of this library and uses nothing else.
 
-// The thrice lifted autodiff types nest deeper than the default limit allows.
-#![recursion_limit = "256"]
+pub mod event;
 
-pub mod atomic;
-pub mod backend;
-pub mod cli;
-pub mod compare;
-pub mod evaluate;
-pub mod learner;
-pub mod matching;
-pub mod recipe;
-pub mod report;
-pub mod run_directory;
-pub mod shape;
-pub mod surface;
-mod tensors;
-mod workers;
+mod atomic;
+mod backend;
+mod compare;
+mod error;
+mod evaluate;
+mod matching;
+mod memory;
+mod report;
+mod session;
+mod shape;
+mod surface;
+
+pub use backend::Backend;
+pub use error::{Error, ErrorKind, Result};
+pub use event::Event;
+pub use isomorph_training::recipe;
+pub use recipe::Recipe;
+pub use session::describe::describe;
+pub use session::extract::{ExtractOptions, even_times};
+pub use session::folder::is_run;
+pub use session::stop::StopFlag;
+pub use session::trained::{Distances, Surface};
+pub use session::{Session, Trained};
+pub use shape::{Keyframes, Shape};
+pub use surface::write::SurfaceFormat;
+
+/// Corresponding vertices of two shapes, found from the shapes alone.
+pub mod correspondence {
+    pub use crate::matching::{
+        Coverage, Cycle, MatchOptions, MatchedPair, Matching, Quantiles, Rigid,
+    };
+    pub use crate::session::pairs::find;
+}
+
+/// Normals of a raw point cloud, all pointing out of the shape.
+pub mod normals {
+    pub use crate::session::normals::{AgainstOwn, Estimate, estimate};
+}
+
+/// Runs held against true frames.
+pub mod evaluation {
+    pub use crate::evaluate::{Compared, Evaluation, FrameResult, GroundTruth, Metrics};
+    pub use crate::session::evaluate::EvaluateOptions;
+}
+
+/// Methods side by side on pairs of frames.
+pub mod comparison {
+    pub use crate::compare::{Comparison, command_line, table};
+    pub use crate::session::compare::{CompareOptions, compare, known};
+}
+
+/// What a training step costs on this machine.
+pub mod benchmark {
+    pub use crate::session::bench::{
+        BenchOptions, Measured, PhaseCost, Phases, Size, bench, unused,
+    };
+}

@@ -1,21 +1,13 @@
 //! `isomorph evaluate`: how close a run comes to the true frames between its ends.
 
+use std::fmt::Write;
 use std::path::PathBuf;
 
-use anyhow::Result;
 use clap::Args;
-use isomorph_model::TrainBackend;
+use isomorph::Trained;
+use isomorph::evaluation::{EvaluateOptions, Evaluation, GroundTruth, Metrics};
 
-use super::candidate::{Ruler, measure};
-use super::{BackendArgs, Ending, stop_on_interrupt, trained};
-use crate::atomic::write_atomically;
-use crate::backend::{self, Task};
-use crate::evaluate::{Evaluation, GroundTruth, Metrics, Options, Reference, Span};
-use crate::learner::checkpoint::Checkpoint;
-use crate::learner::settings;
-use crate::recipe::Recipe;
-use crate::run_directory::RunDirectory;
-use crate::shape::{self, Normalisation};
+use super::{BackendArgs, QuietArgs, Result, print, stop_on_interrupt};
 
 /// Measure a run against the true frames between its ends
 ///
@@ -50,6 +42,9 @@ pub(super) struct EvaluateArgs {
 
     #[command(flatten)]
     place: BackendArgs,
+
+    #[command(flatten)]
+    quiet: QuietArgs,
 }
 
 /// How closely to look.
@@ -69,104 +64,51 @@ pub(super) struct PrecisionArgs {
 }
 
 impl PrecisionArgs {
-    /// What the evaluation is told.
-    pub(super) fn options(&self) -> Options {
-        Options {
+    /// The same in the library's words.
+    pub(super) fn options(&self) -> EvaluateOptions {
+        EvaluateOptions {
             samples: self.samples as usize,
             every: self.every as usize,
-            ..Options::default()
+            resolution: self.resolution.map(|cells| cells as usize),
         }
     }
-
-    /// The resolution of surfaces.
-    pub(super) fn resolution(&self, recipe: &Recipe) -> usize {
-        self.resolution
-            .map_or(recipe.result.resolution, |cells| cells as usize)
-    }
 }
 
-pub(super) fn run(args: EvaluateArgs) -> Result<Ending> {
-    let run = RunDirectory::open(&args.run)?;
-    let checkpoint = Checkpoint::newest(&run.checkpoints())?;
-    let recipe = checkpoint.recipe()?;
-    let truth = GroundTruth::read(&args.ground_truth)?;
-    let span = truth.span(args.from, args.to)?;
-    // Only the points are looked at: what corresponds to what plays no part.
-    let pair = shape::prepare(&settings::data(&recipe, None))?;
-    let (source, target) = (&pair.source.points, &pair.target.points);
-    truth.check_ends(span, &pair.normalisation, source, target)?;
-    let normalisation = true_frame(&truth, span)?;
-    let reference = Reference::new(&truth, span, &normalisation, args.precision.options())?;
-    let task = Evaluate {
-        normalisation,
-        resolution: args.precision.resolution(&recipe),
-        checkpoint,
-        recipe,
-        reference,
-    };
-    let place = &args.place;
-    let Some(evaluation) = backend::run(place.backend, place.device.as_deref(), task)?? else {
-        return Ok(Ending::Interrupted);
-    };
-    let text = serde_json::to_string(&evaluation)? + "\n";
-    let file = run.path().join("evaluation.json");
-    write_atomically(&file, |out| out.write_all(text.as_bytes()))?;
+pub(super) fn run(args: EvaluateArgs) -> Result {
+    let trained = Trained::open(&args.run, args.place.backend()?)?;
+    let truth = GroundTruth::read(&args.ground_truth).map_err(isomorph::Error::from)?;
+    let (frames, stop) = ([args.from, args.to], stop_on_interrupt());
+    let mut terminal = args.quiet.terminal(&args.run);
+    let options = args.precision.options();
+    let evaluation = trained.evaluate(&truth, frames, &options, &stop, |event| {
+        terminal.show(event);
+    })?;
     if args.json {
-        print!("{text}");
+        print(&(serde_json::to_string(&evaluation)? + "\n"))
     } else {
-        print_table(&evaluation, span);
-    }
-    Ok(Ending::Done)
-}
-
-/// The coordinates in which everything is measured: those of the true ends.
-pub(super) fn true_frame(truth: &GroundTruth, span: Span) -> Result<Normalisation> {
-    let (source, target) = (truth.shape(span.from()), truth.shape(span.to()));
-    Ok(Normalisation::joint(&[&source, &target])?)
-}
-
-struct Evaluate {
-    normalisation: Normalisation,
-    checkpoint: Checkpoint,
-    recipe: Recipe,
-    reference: Reference,
-    resolution: usize,
-}
-
-impl Task for Evaluate {
-    type Output = Result<Option<Evaluation>>;
-
-    fn run<B: TrainBackend>(self, device: B::Device) -> Self::Output {
-        let trained = trained::load::<B>(&self.checkpoint, &self.recipe, device)?;
-        let stop = stop_on_interrupt()?;
-        let ruler = Ruler {
-            reference: &self.reference,
-            normalisation: self.normalisation,
-            resolution: self.resolution,
-            stop: &stop,
-        };
-        measure(&trained, &ruler)
+        print(&table(&evaluation, frames))
     }
 }
 
 /// The means, one line per thing measured.
-fn print_table(evaluation: &Evaluation, span: Span) {
+fn table(evaluation: &Evaluation, [from, to]: [usize; 2]) -> String {
     let mean = &evaluation.mean;
-    println!(
-        "mean over {} frames between {} and {}; lengths in normalised units",
+    let mut table = format!(
+        "mean over {} frames between {from} and {to}; lengths in normalised units\n",
         evaluation.frames.len(),
-        span.from(),
-        span.to()
     );
-    println!(
+    // Writing to a string does not fail.
+    let _ = writeln!(
+        table,
         "{:18} {:>9} {:>9} {:>9} {:>9} {:>8} {:>8} {:>6} {:>9}",
         "", "CD x10^3", "CD", "HD", "HD95", "normals", "volume", "pieces", "tracked"
     );
-    let line = |name: &str, metrics: &Metrics| {
+    let mut line = |name: &str, metrics: &Metrics| {
         let tracked = metrics
             .tracked_rmse
             .map_or_else(|| "-".to_owned(), |rmse| format!("{rmse:.5}"));
-        println!(
+        let _ = writeln!(
+            table,
             "{name:18} {:9.4} {:9.5} {:9.4} {:9.5} {:8.4} {:8.4} {:6.2} {tracked:>9}",
             1e3 * metrics.chamfer_squared,
             metrics.chamfer,
@@ -197,8 +139,9 @@ fn print_table(evaluation: &Evaluation, span: Span) {
     if let Some(carried) = evaluation.ends.last().and_then(|end| end.carried.as_ref()) {
         line("carried to target", &carried.metrics);
     }
-    println!(
+    table.push_str(
         "CD x10^3 is the squared Chamfer distance of the paper; CD and HD are not squared; aligned: at the \
-         best times; source, target: the ends that the run has seen"
+         best times; source, target: the ends that the run has seen\n",
     );
+    table
 }

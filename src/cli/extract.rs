@@ -2,20 +2,10 @@
 
 use std::path::PathBuf;
 
-use anyhow::Result;
 use clap::{Args, ValueEnum};
-use isomorph_model::TrainBackend;
+use isomorph::{ExtractOptions, SurfaceFormat, Trained, even_times};
 
-use super::trained;
-use super::training::write_and_show;
-use super::{BackendArgs, Ending, QuietArgs, Usage, even_times, stop_on_interrupt};
-use crate::backend::{self, Task};
-use crate::learner::checkpoint::Checkpoint;
-use crate::recipe::Recipe;
-use crate::report::Reporter;
-use crate::run_directory::RunDirectory;
-use crate::surface::frames::FrameOptions;
-use crate::surface::write::SurfaceFormat;
+use super::{BackendArgs, QuietArgs, Result, print, stop_on_interrupt};
 
 /// Write the surfaces of a trained run at any times, in any resolution
 ///
@@ -76,64 +66,30 @@ enum Format {
     Obj,
 }
 
-pub(super) fn run(args: ExtractArgs) -> Result<Ending> {
-    let run = RunDirectory::open(&args.run)?;
-    let checkpoint = Checkpoint::newest(&run.checkpoints())?;
-    let times = if args.times.is_empty() {
-        even_times(args.frames as usize)
-    } else {
-        args.times.clone()
-    };
-    if let Some(time) = times.iter().find(|time| !(0.0..=1.0).contains(*time)) {
-        return Err(Usage(format!("--times: {time}: must be 0 to 1 (0 is the source)")).into());
-    }
-    let mut recipe = checkpoint.recipe()?;
-    if let Some(share) = args.smallest_component {
-        if !(0.0..=1.0).contains(&share) {
-            return Err(Usage(format!("--smallest-component: {share}: must be 0 to 1")).into());
-        }
-        recipe.result.smallest_component = share;
-    }
-    let options = FrameOptions {
-        times,
+pub(super) fn run(args: ExtractArgs) -> Result {
+    let trained = Trained::open(&args.run, args.place.backend()?)?;
+    let defaults = ExtractOptions::of(trained.recipe());
+    let options = ExtractOptions {
+        times: if args.times.is_empty() {
+            even_times(args.frames as usize)
+        } else {
+            args.times
+        },
         resolution: args
             .resolution
-            .map_or(recipe.result.resolution, |cells| cells as usize),
+            .map_or(defaults.resolution, |cells| cells as usize),
         format: match args.format {
             Format::Ply => SurfaceFormat::Ply,
             Format::Obj => SurfaceFormat::Obj,
         },
-        carry: args.carry.then(|| recipe.data.source.clone()),
-        folder: args.output.clone().unwrap_or_else(|| run.meshes()),
+        carry: args.carry,
+        smallest_component: args
+            .smallest_component
+            .unwrap_or(defaults.smallest_component),
+        folder: args.output,
     };
-    let reporter = Reporter::new(&run, Some(usize::MAX), args.quiet.verbosity())?;
-    let place = args.place.clone();
-    let task = Extract {
-        checkpoint,
-        recipe,
-        options,
-        reporter,
-    };
-    backend::run(place.backend, place.device.as_deref(), task)?
-}
-
-struct Extract {
-    checkpoint: Checkpoint,
-    recipe: Recipe,
-    options: FrameOptions,
-    reporter: Reporter,
-}
-
-impl Task for Extract {
-    type Output = Result<Ending>;
-
-    fn run<B: TrainBackend>(mut self, device: B::Device) -> Self::Output {
-        let trained = trained::load::<B>(&self.checkpoint, &self.recipe, device)?;
-        let stop = stop_on_interrupt()?;
-        let ending = write_and_show(&trained, &self.options, &stop, &mut self.reporter)?;
-        if ending == Ending::Done {
-            println!("{}", self.options.folder.join("frames.json").display());
-        }
-        Ok(ending)
-    }
+    let mut terminal = args.quiet.terminal(&args.run);
+    let stop = stop_on_interrupt();
+    let listing = trained.extract(&options, &stop, |event| terminal.show(event))?;
+    print(&format!("{}\n", listing.display()))
 }

@@ -1,16 +1,10 @@
 //! `isomorph info`: what a shape, a sequence, a recipe or a run is.
 
-use std::fmt::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use anyhow::{Context, Result};
 use clap::Args;
 
-use super::Ending;
-use crate::learner::checkpoint::{self, Checkpoint};
-use crate::recipe::{MethodName, Recipe};
-use crate::run_directory::RunDirectory;
-use crate::shape::{self, Sequence, Shape};
+use super::{Result, print};
 
 /// Say what a shape, a sequence (.anime), a recipe (.toml) or a run is
 #[derive(Debug, Args)]
@@ -19,119 +13,6 @@ pub(super) struct InfoArgs {
     path: PathBuf,
 }
 
-pub(super) fn run(args: InfoArgs) -> Result<Ending> {
-    let path = &args.path;
-    std::fs::metadata(path).with_context(|| path.display().to_string())?;
-    let extension = path
-        .extension()
-        .and_then(|text| text.to_str())
-        .unwrap_or_default();
-    let text = match extension.to_ascii_lowercase().as_str() {
-        _ if path.is_dir() => run_info(path)?,
-        "anime" => sequence_info(&Sequence::read(path)?),
-        "toml" => Recipe::read(path, &[])?.to_toml(),
-        _ => shape_info(&shape::read(path)?)?,
-    };
-    std::io::Write::write_all(&mut std::io::stdout(), text.as_bytes())?;
-    Ok(Ending::Done)
-}
-
-fn shape_info(shape: &Shape) -> Result<String> {
-    let mut text = String::new();
-    let kind = if shape.is_mesh() {
-        "mesh"
-    } else {
-        "point cloud"
-    };
-    writeln!(text, "{}: {kind}", shape.path.display())?;
-    writeln!(text, "vertices     {}", shape.vertices.len())?;
-    writeln!(text, "triangles    {}", shape.triangles.len())?;
-    let normals = if shape.normals.is_some() {
-        "given"
-    } else {
-        "none"
-    };
-    writeln!(text, "normals      {normals}")?;
-    let (low, high) = box_of(&shape.vertices);
-    writeln!(text, "box          {low:?} to {high:?}")?;
-    let estimated = if shape.is_mesh() {
-        ""
-    } else {
-        " (estimated from the density)"
-    };
-    writeln!(text, "area         {:.6}{estimated}", shape.area()?)?;
-    if shape.is_mesh() {
-        let closed = shape::mesh::EdgeSharing::of(&shape.vertices, &shape.triangles).is_closed();
-        writeln!(text, "closed       {}", if closed { "yes" } else { "no" })?;
-        if closed {
-            let volume = shape::mesh::signed_volume(&shape.vertices, &shape.triangles);
-            writeln!(text, "volume       {volume:.6}")?;
-        }
-    }
-    Ok(text)
-}
-
-fn sequence_info(sequence: &Sequence) -> String {
-    let vertices = sequence.frames.first().map_or(0, Vec::len);
-    format!(
-        "sequence: {} frames, {vertices} vertices, {} triangles\n",
-        sequence.frames.len(),
-        sequence.triangles.len()
-    )
-}
-
-fn run_info(path: &Path) -> Result<String> {
-    let run = RunDirectory::open(path)?;
-    let checkpoints = checkpoint::list(&run.checkpoints());
-    let mut text = String::new();
-    writeln!(text, "{}: run", path.display())?;
-    let steps: Vec<String> = checkpoints
-        .iter()
-        .map(|(step, _)| step.to_string())
-        .collect();
-    if steps.is_empty() {
-        writeln!(text, "checkpoints  none yet")?;
-        return Ok(text);
-    }
-    writeln!(text, "checkpoints  at steps {}", steps.join(", "))?;
-    let newest = Checkpoint::newest(&run.checkpoints())?;
-    let (state, recipe) = (&newest.state, newest.recipe()?);
-    writeln!(
-        text,
-        "steps        {} of {}",
-        state.step, recipe.training.steps
-    )?;
-    writeln!(text, "seconds      {:.1}", state.seconds)?;
-    writeln!(text, "backend      {}", state.backend)?;
-    writeln!(text, "method       {}", recipe.method.name)?;
-    writeln!(text, "preset       {}", recipe.preset)?;
-    writeln!(text, "source       {}", recipe.data.source.display())?;
-    writeln!(text, "target       {}", recipe.data.target.display())?;
-    if recipe.method.name == MethodName::VelocityField {
-        let (f, v) = (&recipe.implicit, &recipe.velocity);
-        writeln!(
-            text,
-            "f            {} x {}, {}",
-            f.depth, f.width, f.activation
-        )?;
-        writeln!(
-            text,
-            "V            {} x {}, {}",
-            v.depth, v.width, v.activation
-        )?;
-    }
-    let (centre, scale) = (state.normalisation.centre, state.normalisation.scale);
-    writeln!(text, "normalised   (x - {centre:?}) * {scale}")?;
-    Ok(text)
-}
-
-fn box_of(vertices: &[[f64; 3]]) -> ([f64; 3], [f64; 3]) {
-    let start = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    vertices.iter().fold(start, |(low, high), vertex| {
-        let low = std::array::from_fn(|axis| f64::min(low[axis], vertex[axis]));
-        (
-            low,
-            std::array::from_fn(|axis| f64::max(high[axis], vertex[axis])),
-        )
-    })
+pub(super) fn run(args: InfoArgs) -> Result {
+    print(&isomorph::describe(&args.path)?)
 }

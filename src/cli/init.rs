@@ -2,12 +2,11 @@
 
 use std::path::PathBuf;
 
-use anyhow::Result;
 use clap::Args;
+use isomorph::recipe::{Correspondences, Preset};
+use isomorph::{Recipe, Shape};
 
-use super::{Ending, Usage};
-use crate::recipe::{Correspondences, Preset, Recipe};
-use crate::shape;
+use super::{Failure, Result, print};
 
 /// Print a commented recipe for two shapes
 ///
@@ -30,13 +29,13 @@ pub(super) struct InitArgs {
     preset: String,
 }
 
-pub(super) fn run(args: InitArgs) -> Result<Ending> {
+pub(super) fn run(args: InitArgs) -> Result {
     for path in [&args.source, &args.target] {
-        shape::read(path)?;
+        Shape::read(path)?;
     }
     let preset = Preset::from_word(&args.preset).ok_or_else(|| {
         let allowed = Preset::WORDS.join(", ");
-        Usage(format!(
+        Failure::Usage(format!(
             "--preset {}: must be one of {allowed}",
             args.preset
         ))
@@ -47,7 +46,6 @@ pub(super) fn run(args: InitArgs) -> Result<Ending> {
         "match" => Correspondences::Match,
         file => Correspondences::File(PathBuf::from(file)),
     };
-    let text = Recipe::commented(&args.source, &args.target, &correspondences, preset)?;
-    std::io::Write::write_all(&mut std::io::stdout(), text.as_bytes())?;
-    Ok(Ending::Done)
+    let text = Recipe::commented(&args.source, &args.target, &correspondences, preset);
+    print(&text.map_err(isomorph::Error::from)?)
 }

@@ -4,15 +4,12 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use anyhow::Result;
 use clap::Args;
+use isomorph::Shape;
+use isomorph::correspondence::{MatchOptions, Matching, Rigid, find};
 use serde::Serialize;
 
-use super::{Ending, Usage};
-use crate::atomic::write_atomically;
-use crate::compare::{ChartError, Line, Panel, line_chart};
-use crate::matching::{MatchOptions, Matching, Rigid, match_shapes};
-use crate::shape;
+use super::{Failure, Result, print};
 
 /// Find which points of two shapes correspond, and write them as pairs
 ///
@@ -65,13 +62,14 @@ pub(super) struct MatchArgs {
     json: bool,
 }
 
-pub(super) fn run(args: MatchArgs) -> Result<Ending> {
+pub(super) fn run(args: MatchArgs) -> Result {
     if let Some(path) = &args.picture
         && path
             .extension()
             .is_none_or(|extension| !extension.eq_ignore_ascii_case("svg"))
     {
-        return Err(Usage(format!("--picture {}: must end in .svg", path.display())).into());
+        let path = path.display();
+        return Err(Failure::Usage(format!("--picture {path}: must end in .svg")));
     }
     let options = MatchOptions {
         points: args.points,
@@ -81,30 +79,23 @@ pub(super) fn run(args: MatchArgs) -> Result<Ending> {
         count: args.count,
         seed: args.seed,
     };
-    let (source, target) = (shape::read(&args.source)?, shape::read(&args.target)?);
-    let matching = match_shapes(&source, &target, &options)?;
-    let figure = args
-        .picture
-        .as_ref()
-        .map(|_| figure(&matching))
-        .transpose()?;
-    matching.write_csv(&args.output)?;
-    if let (Some(path), Some(figure)) = (&args.picture, figure) {
-        write_atomically(path, |out| out.write_all(figure.as_bytes()))?;
+    let (source, target) = (Shape::read(&args.source)?, Shape::read(&args.target)?);
+    let matching = find(&source, &target, &options)?;
+    matching.write_pairs(&args.output)?;
+    if let Some(path) = &args.picture {
+        matching.write_picture(path)?;
     }
-    if args.json {
-        let report = Report {
-            source: &args.source,
-            target: &args.target,
-            output: &args.output,
-            pairs: matching.pairs.len(),
-            matching: &matching,
-        };
-        println!("{}", serde_json::to_string(&report)?);
-    } else {
-        print!("{}", text(&matching, &args)?);
+    if !args.json {
+        return print(&text(&matching, &args));
     }
-    Ok(Ending::Done)
+    let report = Report {
+        source: &args.source,
+        target: &args.target,
+        output: &args.output,
+        pairs: matching.pairs.len(),
+        matching: &matching,
+    };
+    print(&(serde_json::to_string(&report)? + "\n"))
 }
 
 /// What `--json` prints.
@@ -119,47 +110,48 @@ struct Report<'a> {
 }
 
 /// What is printed for people.
-fn text(found: &Matching, args: &MatchArgs) -> Result<String, std::fmt::Error> {
+fn text(found: &Matching, args: &MatchArgs) -> String {
+    // Writing to a string does not fail.
     let mut text = String::new();
     let own = |length: f64| length / found.scale;
     let kept = match args.count {
         Some(count) if count <= found.pairs.len() => ", spread evenly",
         _ => "",
     };
-    writeln!(
+    let _ = writeln!(
         text,
         "pairs        {} of {} mutual nearest neighbours (confidence {} or more{kept}): {}",
         found.pairs.len(),
         found.mutual,
         args.confidence,
         args.output.display()
-    )?;
+    );
     let coverage = &found.coverage;
-    writeln!(
+    let _ = writeln!(
         text,
         "coverage     {:.1} % of the source, {:.1} % of the target within {:.3} of a pair ({} normalised)",
         100.0 * coverage.source,
         100.0 * coverage.target,
         own(coverage.radius),
         coverage.radius
-    )?;
+    );
     let ways = [
         ("cycle        from the source and back", &found.cycle.source),
         ("             from the target and back", &found.cycle.target),
     ];
     for (label, cycle) in ways {
-        writeln!(
+        let _ = writeln!(
             text,
             "{label}: median {:.4}, 95 % {:.4} normalised ({:.4}, {:.4} in the shapes' unit)",
             cycle.median,
             cycle.quantile_95,
             own(cycle.median),
             own(cycle.quantile_95)
-        )?;
+        );
     }
-    writeln!(text, "rigid part   {}", rigid_text(&found.rigid))?;
-    writeln!(text, "time         {:.1} s", found.seconds)?;
-    Ok(text)
+    let _ = writeln!(text, "rigid part   {}", rigid_text(&found.rigid));
+    let _ = writeln!(text, "time         {:.1} s", found.seconds);
+    text
 }
 
 fn rigid_text(rigid: &Rigid) -> String {
@@ -170,40 +162,4 @@ fn rigid_text(rigid: &Rigid) -> String {
         "{:.1} degrees, then {:?} (surfaces {:.4} apart, {:.4} without it)",
         rigid.degrees, rigid.translation, rigid.distance, rigid.distance_unmoved
     )
-}
-
-/// Places at which a distribution is drawn.
-const PLACES: usize = 200;
-
-/// The share of points that come back to within a distance, over the distance.
-fn figure(found: &Matching) -> Result<String, ChartError> {
-    let line = |label: &str, sorted: &[f64]| {
-        let last = sorted.len() - 1;
-        let place = |k: usize| {
-            let share = k as f64 / PLACES as f64;
-            [
-                sorted[(share * last as f64).round() as usize],
-                100.0 * share,
-            ]
-        };
-        Line {
-            label: label.to_owned(),
-            points: (0..=PLACES).map(place).collect(),
-            ..Line::default()
-        }
-    };
-    let cycle = &found.cycle;
-    let most = cycle.source.quantile_95.max(cycle.target.quantile_95);
-    let panel = Panel {
-        title: "share of points that come back to within a distance".to_owned(),
-        x_label: "distance from where they began (normalised)".to_owned(),
-        y_label: "points (%)".to_owned(),
-        x_range: (most > 0.0).then_some([0.0, 1.5 * most]),
-        lines: vec![
-            line("source to target and back", &cycle.source.sorted),
-            line("target to source and back", &cycle.target.sorted),
-        ],
-        ..Panel::default()
-    };
-    line_chart("Cycle consistency", &[panel])
 }

@@ -1,38 +1,29 @@
-//! The command line: one file per subcommand, and what they share.
+//! The command line: one file per subcommand, and what they share. It holds words for people and uses nothing
+//! but the library's public API.
 //!
 //! Results go to standard output, all else to standard error. Exit status: 0 done, 1 failed, 2 usage or
 //! a bad recipe, 130 interrupted with a checkpoint written.
 
 mod bench;
-mod candidate;
 mod compare;
-mod compared;
 mod evaluate;
 mod extract;
 mod info;
 mod init;
 mod match_shapes;
 mod normals;
-mod paired;
 mod resume;
+mod terminal;
 mod train;
-mod trained;
-mod training;
 
+use std::io::{self, Write};
 use std::process::ExitCode;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
+use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand};
+use isomorph::{Backend, ErrorKind, StopFlag};
 
-use crate::backend::{BackendError, BackendName};
-use crate::compare::PlanError;
-use crate::evaluate::TruthError;
-use crate::matching::MatchError;
-use crate::recipe::RecipeError;
-use crate::report::Verbosity;
-use crate::run_directory::RunError;
-use crate::surface::extract::GridError;
+use terminal::Terminal;
 
 /// Learns a continuous, physically plausible deformation between two 3D shapes.
 #[derive(Debug, Parser)]
@@ -67,8 +58,8 @@ enum Command {
 #[derive(Clone, Debug, Args)]
 struct BackendArgs {
     /// Where to compute
-    #[arg(long, value_enum, default_value_t = DEFAULT_BACKEND)]
-    backend: BackendName,
+    #[arg(long, default_value = DEFAULT_BACKEND, value_parser = PossibleValuesParser::new(Backend::NAMES))]
+    backend: String,
 
     /// Device of the backend: default, cpu, discrete[:N], integrated[:N] or virtual[:N]
     #[arg(long, value_name = "NAME")]
@@ -76,7 +67,18 @@ struct BackendArgs {
 }
 
 /// The fastest backend that runs on every machine.
-const DEFAULT_BACKEND: BackendName = BackendName::Flex;
+const DEFAULT_BACKEND: &str = "flex";
+
+impl BackendArgs {
+    /// The backend that was chosen.
+    fn backend(&self) -> Result<Backend> {
+        let backend: Backend = self.backend.parse()?;
+        Ok(match &self.device {
+            Some(device) => backend.on(device)?,
+            None => backend,
+        })
+    }
+}
 
 /// Changes of the recipe from the command line.
 #[derive(Clone, Debug, Args)]
@@ -86,7 +88,7 @@ struct SetArgs {
     overrides: Vec<String>,
 }
 
-/// How much is told on the way.
+/// How much is printed while work goes on.
 #[derive(Clone, Copy, Debug, Args)]
 struct QuietArgs {
     /// Print errors only
@@ -95,20 +97,56 @@ struct QuietArgs {
 }
 
 impl QuietArgs {
-    fn verbosity(self) -> Verbosity {
-        if self.quiet {
-            Verbosity::Quiet
-        } else {
-            Verbosity::Normal
-        }
+    /// What shows the events of the run in this folder.
+    fn terminal(self, run: &std::path::Path) -> Terminal {
+        Terminal::new(run, self.quiet)
     }
 }
 
-/// How a command ended without an error.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Ending {
-    Done,
-    Interrupted,
+/// Why a command failed.
+#[derive(Debug)]
+enum Failure {
+    /// What the library says.
+    Library(isomorph::Error),
+    /// A mistake on the command line that clap cannot find.
+    Usage(String),
+    /// Standard output cannot be written.
+    Output(io::Error),
+}
+
+/// How a command ended.
+type Result<T = ()> = std::result::Result<T, Failure>;
+
+impl From<isomorph::Error> for Failure {
+    fn from(error: isomorph::Error) -> Self {
+        Self::Library(error)
+    }
+}
+
+impl From<serde_json::Error> for Failure {
+    fn from(error: serde_json::Error) -> Self {
+        Self::Output(error.into())
+    }
+}
+
+impl Failure {
+    /// The exit status, after one line for people.
+    fn end(self) -> ExitCode {
+        let (kind, text) = match self {
+            // Whoever read the output has enough of it.
+            Self::Output(error) if error.kind() == io::ErrorKind::BrokenPipe => {
+                return ExitCode::SUCCESS;
+            }
+            Self::Output(error) => (ErrorKind::Failure, format!("standard output: {error}")),
+            Self::Usage(text) => (ErrorKind::Usage, text),
+            Self::Library(error) => (error.kind(), error.to_string()),
+        };
+        // The events have said so already, and what to do next.
+        if kind != ErrorKind::Interruption {
+            eprintln!("error: {text}");
+        }
+        ExitCode::from(kind.exit_status())
+    }
 }
 
 /// Runs the command and says how it went.
@@ -126,76 +164,28 @@ pub fn run(cli: Cli) -> ExitCode {
         Command::Bench(args) => bench::run(args),
     };
     match ended {
-        Ok(Ending::Done) => ExitCode::SUCCESS,
-        Ok(Ending::Interrupted) => ExitCode::from(130),
-        Err(error) => {
-            if is_closed_pipe(&error) {
-                // Whoever read our output has seen enough.
-                return ExitCode::SUCCESS;
-            }
-            eprintln!("error: {error:#}");
-            ExitCode::from(if is_usage(&error) { 2 } else { 1 })
-        }
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => failure.end(),
     }
 }
 
-/// Whether the user can mend the command line or the recipe, rather than the files or the machine.
-fn is_usage(error: &anyhow::Error) -> bool {
-    error.chain().any(|cause| {
-        cause.is::<RecipeError>()
-            || cause.is::<Usage>()
-            || cause.is::<PlanError>()
-            || cause.is::<GridError>()
-            || matches!(
-                cause.downcast_ref::<MatchError>(),
-                Some(MatchError::Option { .. })
-            )
-            || matches!(
-                cause.downcast_ref::<TruthError>(),
-                Some(TruthError::Span { .. } | TruthError::Option { .. })
-            )
-            || matches!(
-                cause.downcast_ref::<BackendError>(),
-                Some(BackendError::Absent(_) | BackendError::Device { .. })
-            )
-            || matches!(
-                cause.downcast_ref::<RunError>(),
-                Some(RunError::Exists(_) | RunError::NotARun(_) | RunError::Missing(_))
-            )
-    })
+/// Writes a result to standard output.
+fn print(text: &str) -> Result {
+    let mut out = io::stdout().lock();
+    out.write_all(text.as_bytes())
+        .and_then(|()| out.flush())
+        .map_err(Failure::Output)
 }
-
-fn is_closed_pipe(error: &anyhow::Error) -> bool {
-    error.chain().any(|cause| {
-        cause
-            .downcast_ref::<std::io::Error>()
-            .is_some_and(|error| error.kind() == std::io::ErrorKind::BrokenPipe)
-    })
-}
-
-/// A mistake on the command line that clap cannot see.
-#[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-struct Usage(String);
 
 /// A flag that Ctrl-C or a request to terminate sets; a second one ends the process at once.
-fn stop_on_interrupt() -> anyhow::Result<Arc<AtomicBool>> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let flag = Arc::clone(&stop);
-    ctrlc::set_handler(move || {
-        if flag.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
+fn stop_on_interrupt() -> StopFlag {
+    let stop = StopFlag::default();
+    let flag = stop.clone();
+    let handled = ctrlc::set_handler(move || {
+        if flag.set() {
+            std::process::exit(i32::from(ErrorKind::Interruption.exit_status()));
         }
-    })?;
-    Ok(stop)
-}
-
-/// Evenly spaced times from 0 to 1.
-fn even_times(frames: usize) -> Vec<f64> {
-    match frames {
-        1 => vec![0.0],
-        _ => (0..frames)
-            .map(|k| k as f64 / (frames - 1) as f64)
-            .collect(),
-    }
+    });
+    handled.expect("one handler for the one command of this process");
+    stop
 }

@@ -2,18 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::Result;
 use clap::Args;
+use isomorph::{Recipe, Session, is_run};
 
-use super::paired;
-use super::trained;
-use super::training::Training;
-use super::{BackendArgs, Ending, QuietArgs, SetArgs};
-use crate::backend;
-use crate::learner::event::Event;
-use crate::recipe::Recipe;
-use crate::report::Reporter;
-use crate::run_directory::RunDirectory;
+use super::{BackendArgs, Failure, QuietArgs, Result, SetArgs, stop_on_interrupt};
 
 /// Train on the two shapes of a recipe, and write a few surfaces in between
 ///
@@ -43,30 +35,26 @@ pub(super) struct TrainArgs {
     quiet: QuietArgs,
 }
 
-pub(super) fn run(args: TrainArgs) -> Result<Ending> {
-    let recipe = Recipe::read(&args.recipe, &args.set.overrides)?;
-    // Before the run's folder exists: what cannot be read or opened leaves nothing behind.
-    backend::check(args.place.backend, args.place.device.as_deref())?;
-    let prepared = paired::prepare(&recipe, None, args.quiet.verbosity())?;
-    trained::check(&recipe, &prepared.pair)?;
-    let path = args.run.unwrap_or_else(|| default_run(&args.recipe));
-    let run = RunDirectory::create(&path, &recipe.to_toml(), args.force)?;
-    let mut reporter = Reporter::new(&run, None, args.quiet.verbosity())?;
-    if let Some(matched) = prepared.keep(&run)? {
-        reporter.handle(&matched)?;
+pub(super) fn run(args: TrainArgs) -> Result {
+    let recipe = Recipe::read(&args.recipe, &args.set.overrides).map_err(isomorph::Error::from)?;
+    let folder = args.run.unwrap_or_else(|| default_run(&args.recipe));
+    if !args.force && is_run(&folder) {
+        let folder = folder.display();
+        return Err(Failure::Usage(format!(
+            "{folder}: exists already; resume it with `isomorph resume {folder}`, choose another with \
+             --run, or replace it with --force"
+        )));
     }
-    let pair = prepared.pair;
-    for note in &pair.notes {
-        reporter.handle(&Event::Note(note.clone()))?;
-    }
-    let training = Training {
-        recipe,
-        pair,
-        run,
-        checkpoint: None,
-        reporter,
+    let session = Session::prepare(recipe, &folder, args.place.backend()?)?;
+    let session = session.stopped_by(stop_on_interrupt());
+    let mut session = if args.force {
+        session.replacing()
+    } else {
+        session
     };
-    training.start(&args.place)
+    let mut terminal = args.quiet.terminal(&folder);
+    session.train(|event| terminal.show(event))?;
+    Ok(())
 }
 
 /// `runs/` and the names of the recipe's folder and of the recipe: `data/fox/quick.toml` trains into

@@ -12,7 +12,7 @@
 //! | `normals.rs` | normals of a raw cloud, pointing outwards |
 //! | `correspond.rs` | pairs of vertices that are known to correspond |
 //! | `normalise.rs` | the joint frame in which the networks work, and the way back |
-//! | `pair.rs` | all of it in order: two files in, one [`Pair`] ready for training out |
+//! | `keyframes.rs` | all of it in order: shapes in, [`Keyframes`] ready for training out |
 //!
 //! Naming rule: a *vertex* is what a file lists (float64, the user's own coordinates, the file's
 //! order, counted from 0); a *point* is what the networks are trained on (float32, normalised).
@@ -22,6 +22,7 @@ pub(crate) mod connected;
 mod correspond;
 mod distance;
 mod error;
+mod keyframes;
 #[cfg(test)]
 mod malformed;
 pub mod mesh;
@@ -29,7 +30,6 @@ mod neighbours;
 mod normalise;
 mod normals;
 pub(crate) mod obj;
-mod pair;
 pub(crate) mod ply;
 mod sample;
 #[cfg(test)]
@@ -41,13 +41,18 @@ pub use correspond::Correspondences;
 pub use distance::SignedDistance;
 pub use error::ShapeError;
 pub use neighbours::{Neighbour, NeighbourSearch};
-pub use normalise::{Bounds, Normalisation, cloud_area};
+pub use isomorph_training::data::Bounds;
+pub use normalise::{Normalisation, cloud_area};
 pub use normals::{EstimatedNormals, estimate_normals};
-pub(crate) use pair::points_of;
-pub use pair::{Cloud, CorrespondenceSource, DataOptions, NormalSource, Pair, prepare};
+pub(crate) use keyframes::points_of;
+pub use keyframes::{
+    Cloud, CorrespondenceSource, DataOptions, Keyframe, Keyframes, NormalSource, prepare,
+};
 pub use sample::{SurfaceSamples, sample_surface};
 
 use std::path::{Path, PathBuf};
+
+use crate::surface::write::{SurfaceFormat, SurfaceView, write_surface};
 
 /// The least number of points that a cloud, or a sample of a mesh, may have: fewer say too little
 /// about a surface, and leave nothing to estimate normals and areas from.
@@ -68,6 +73,53 @@ pub struct Shape {
 }
 
 impl Shape {
+    /// A point cloud that is in no file.
+    pub fn cloud(vertices: Vec<[f64; 3]>) -> Self {
+        Self::mesh(vertices, Vec::new())
+    }
+
+    /// A mesh that is in no file; triangles are counter-clockwise seen from outside.
+    pub fn mesh(vertices: Vec<[f64; 3]>, triangles: Vec<[u32; 3]>) -> Self {
+        Self {
+            path: PathBuf::from("shape"),
+            vertices,
+            triangles,
+            normals: None,
+        }
+    }
+
+    /// Reads a mesh or a point cloud, PLY or OBJ by the ending of its name.
+    ///
+    /// # Errors
+    /// One line that names the file, the place in it, what was found there and what is allowed.
+    ///
+    /// # Examples
+    /// ```no_run
+    /// let fox = isomorph::Shape::read("data/fox/source.ply".as_ref())?;
+    /// println!("{} vertices, {} triangles", fox.vertices.len(), fox.triangles.len());
+    /// # Ok::<(), isomorph::Error>(())
+    /// ```
+    pub fn read(path: &Path) -> crate::Result<Self> {
+        Ok(read(path)?)
+    }
+
+    /// Writes the shape, PLY or OBJ by the ending of the name; whole or not at all.
+    ///
+    /// # Errors
+    /// Another ending; indices out of range; what the file system says.
+    pub fn write(&self, path: &Path) -> crate::Result<()> {
+        let format = SurfaceFormat::of(path).ok_or_else(|| ShapeError::UnknownFormat {
+            path: path.to_owned(),
+            extension: path.extension().unwrap_or_default().to_string_lossy().into(),
+        })?;
+        let view = SurfaceView {
+            vertices: &self.vertices,
+            triangles: &self.triangles,
+            normals: self.normals.as_deref(),
+        };
+        Ok(write_surface(view, path, format)?)
+    }
+
     /// Whether the shape has faces; without any it is a point cloud.
     pub fn is_mesh(&self) -> bool {
         !self.triangles.is_empty()
@@ -141,13 +193,6 @@ impl Shape {
 /// that is missing, empty, truncated or not of its format, coordinates that are not finite, faces
 /// that refer to vertices that do not exist, a cloud of fewer than [`FEWEST_POINTS`] points,
 /// vertices all in one place, no area.
-///
-/// # Examples
-/// ```no_run
-/// let fox = isomorph::shape::read("data/fox/source.ply".as_ref())?;
-/// println!("{} vertices, {} triangles", fox.vertices.len(), fox.triangles.len());
-/// # Ok::<(), isomorph::shape::ShapeError>(())
-/// ```
 pub fn read(path: &Path) -> Result<Shape, ShapeError> {
     let extension = path
         .extension()

@@ -72,58 +72,18 @@ impl Normalisation {
         [0, 1, 2].map(|axis| f64::from(x[axis]) / self.scale + self.centre[axis])
     }
 
-    /// A normalised length in the user's unit.
-    pub fn invert_length(&self, length: f64) -> f64 {
-        length / self.scale
-    }
-}
-
-/// An axis-aligned box in normalised coordinates.
-#[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Debug)]
-pub struct Bounds {
-    /// The corner with the least coordinates.
-    pub min: [f32; 3],
-    /// The corner with the greatest coordinates.
-    pub max: [f32; 3],
-}
-
-impl Bounds {
-    /// The smallest box that holds the points; of no points, an inside-out box that every union
-    /// replaces.
-    pub fn of(points: &[[f32; 3]]) -> Self {
-        let nothing = Self {
-            min: [f32::INFINITY; 3],
-            max: [f32::NEG_INFINITY; 3],
-        };
-        points.iter().fold(nothing, |bounds, &point| {
-            bounds.union(&Self {
-                min: point,
-                max: point,
-            })
+    /// A vertex in the user's coordinates moved as its normalised place moves from `start` to `end`: where
+    /// nothing moves it stays as it was, to the last bit.
+    pub fn displaced(&self, vertex: [f64; 3], start: [f32; 3], end: [f32; 3]) -> [f64; 3] {
+        [0, 1, 2].map(|axis| {
+            let by = f64::from(end[axis]) - f64::from(start[axis]);
+            vertex[axis] + by / self.scale
         })
     }
 
-    /// The smallest box that holds both.
-    #[must_use]
-    pub fn union(&self, other: &Self) -> Self {
-        Self {
-            min: [0, 1, 2].map(|axis| self.min[axis].min(other.min[axis])),
-            max: [0, 1, 2].map(|axis| self.max[axis].max(other.max[axis])),
-        }
-    }
-
-    /// The box with this much more room on every side.
-    #[must_use]
-    pub fn padded(&self, margin: f32) -> Self {
-        Self {
-            min: self.min.map(|low| low - margin),
-            max: self.max.map(|high| high + margin),
-        }
-    }
-
-    /// Its edge lengths.
-    pub fn extent(&self) -> [f32; 3] {
-        [0, 1, 2].map(|axis| self.max[axis] - self.min[axis])
+    /// A normalised length in the user's unit.
+    pub fn invert_length(&self, length: f64) -> f64 {
+        length / self.scale
     }
 }
 
@@ -248,20 +208,5 @@ mod tests {
             "{}",
             frame.scale
         );
-    }
-
-    #[test]
-    fn bounds_hold_their_points_and_grow_by_the_margin() {
-        let bounds = Bounds::of(&[[0.0, 2.0, -1.0], [1.0, -2.0, 3.0]]);
-        assert_eq!(
-            bounds,
-            Bounds {
-                min: [0.0, -2.0, -1.0],
-                max: [1.0, 2.0, 3.0]
-            }
-        );
-        assert_eq!(bounds.union(&Bounds::of(&[])), bounds);
-        assert_eq!(bounds.union(&Bounds::of(&[[9.0; 3]])).max, [9.0; 3]);
-        assert_eq!(bounds.padded(0.5).extent(), [2.0, 5.0, 5.0]);
     }
 }

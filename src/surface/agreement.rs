@@ -1,11 +1,9 @@
 //! Whether a method's surfaces and its motion say the same of the shape.
 
-use burn::tensor::Tensor;
-use isomorph_model::{Geometry, ModelBackend};
+use isomorph_training::deformation::SurfaceField;
 
 use super::frames::FramesError;
-use super::trained::{Surface, Trained, some_of};
-use crate::tensors::{host, rows};
+use super::learned::{Learned, some_of};
 
 /// The most vertices of a surface that are looked at.
 const LOOKED_AT: usize = 1000;
@@ -21,25 +19,25 @@ pub struct Agreement {
     pub round_trip: f64,
 }
 
-impl<B: ModelBackend> Trained<B> {
+impl Learned {
     /// Of the surface at `time`, whose vertices these are; `None` where the method has no field or moves no
     /// points, or the surface is empty.
-    pub(super) fn agreement(
+    pub(crate) fn agreement(
         &self,
         vertices: &[[f32; 3]],
         time: f64,
     ) -> Result<Option<Agreement>, FramesError> {
-        let Surface::Field(geometry) = &self.shape else {
+        let Some(field) = self.deformation.field() else {
             return Ok(None);
         };
-        if self.motion.is_none() || vertices.is_empty() {
+        if self.deformation.motion().is_none() || vertices.is_empty() {
             return Ok(None);
         }
         let start = some_of(vertices, LOOKED_AT);
         let (mut off, mut missed) = (0.0, 0.0);
         for end in [0.0, 1.0] {
             let there = self.carry(&start, time, end)?;
-            off += self.mean_distance(geometry.as_ref(), &there, end);
+            off += mean_distance(field, &there, end);
             let back = self.carry(&there, end, time)?;
             let apart = |(a, b): (&[f32; 3], &[f32; 3])| {
                 let squares = a.iter().zip(b).map(|(a, b)| f64::from(a - b).powi(2));
@@ -53,41 +51,38 @@ impl<B: ModelBackend> Trained<B> {
             round_trip: missed / count,
         }))
     }
+}
 
-    /// The mean of `|f(., time)|`.
-    fn mean_distance(&self, geometry: &dyn Geometry<B>, points: &[[f32; 3]], time: f64) -> f64 {
-        let t = Tensor::full([points.len(), 1], time, &self.device);
-        let values = host(geometry.value(rows(points, &self.device), t));
-        let sum: f64 = values.iter().map(|value| f64::from(value.abs())).sum();
-        sum / points.len() as f64
-    }
+/// The mean of `|f(., time)|`.
+fn mean_distance(field: &dyn SurfaceField, points: &[[f32; 3]], time: f64) -> f64 {
+    let values = field.values(points, time);
+    let sum: f64 = values.iter().map(|value| f64::from(value.abs())).sum();
+    sum / points.len() as f64
 }
 
 #[cfg(test)]
 mod tests {
-    use burn_ndarray::NdArray;
-    use isomorph_model::Motion;
+    use isomorph_training::deformation::PointMotion;
 
     use super::*;
-
-    type Points = Tensor<NdArray, 2>;
+    use crate::surface::learned::testing::Given;
 
     /// A ball of radius 0.4 about `(speed t, 0, 0)`.
     struct Ball {
         speed: f64,
     }
 
-    impl Ball {
-        fn centre(&self, t: Points) -> Points {
-            let none = t.zeros_like();
-            Tensor::cat(vec![t * self.speed, none.clone(), none], 1)
+    impl SurfaceField for Ball {
+        fn values(&self, points: &[[f32; 3]], time: f64) -> Vec<f32> {
+            let centre = (self.speed * time) as f32;
+            let value = |[x, y, z]: &[f32; 3]| {
+                ((x - centre).powi(2) + y.powi(2) + z.powi(2)).sqrt() - 0.4
+            };
+            points.iter().map(value).collect()
         }
-    }
 
-    impl Geometry<NdArray> for Ball {
-        fn value(&self, x: Points, t: Points) -> Points {
-            let from = x - self.centre(t);
-            from.square().sum_dim(1).sqrt() - 0.4
+        fn gradients(&self, points: &[[f32; 3]], _: f64) -> Vec<[f32; 3]> {
+            points.to_vec()
         }
     }
 
@@ -96,23 +91,31 @@ mod tests {
         more: f64,
     }
 
-    impl Motion<NdArray> for Right {
-        fn carry(&self, x: Points, from: f64, to: f64) -> Points {
+    impl PointMotion for Right {
+        fn carry(&self, points: &[[f32; 3]], from: f64, to: f64) -> Vec<[f32; 3]> {
             let speed = if to < from { 0.2 + self.more } else { 0.2 };
-            let by =
-                Tensor::<NdArray, 1>::from_floats([speed * (to - from), 0.0, 0.0], &x.device());
-            x + by.unsqueeze()
+            let by = (speed * (to - from)) as f32;
+            points.iter().map(|[x, y, z]| [x + by, *y, *z]).collect()
+        }
+
+        fn path(&self, start: &[[f32; 3]], times: &[f64]) -> Vec<Vec<[f32; 3]>> {
+            let at = |time: &f64| self.carry(start, 0.0, *time);
+            times.iter().map(at).collect()
+        }
+
+        fn velocities(&self, points: &[[f32; 3]], _: f64) -> Vec<[f32; 3]> {
+            vec![[0.2, 0.0, 0.0]; points.len()]
         }
     }
 
     fn agreement(speed: f64, more: f64) -> Agreement {
-        let trained = Trained {
-            motion: Some(Box::new(Right { more })),
-            ..Trained::of_field(Ball { speed })
-        };
+        let learned = Learned::of(Given {
+            field: Some(Ball { speed }),
+            motion: Some(Right { more }),
+        });
         // The two poles along the motion, where a shift is a distance.
         let at = |x: f64| [(speed * 0.5 + x) as f32, 0.0, 0.0];
-        let found = trained.agreement(&[at(-0.4), at(0.4)], 0.5);
+        let found = learned.agreement(&[at(-0.4), at(0.4)], 0.5);
         found.expect("it moves points").expect("it has a field")
     }
 
@@ -139,8 +142,8 @@ mod tests {
 
     #[test]
     fn without_a_motion_nothing_is_said() {
-        let trained = Trained::of_field(Ball { speed: 0.0 });
-        let found = trained.agreement(&[[0.4, 0.0, 0.0]], 0.0);
+        let learned = Learned::of_field(Ball { speed: 0.0 });
+        let found = learned.agreement(&[[0.4, 0.0, 0.0]], 0.0);
         assert_eq!(found.expect("nothing fails"), None);
     }
 }

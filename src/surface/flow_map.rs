@@ -6,17 +6,19 @@
 //! each axis (Lagrange's). Their error falls with the fourth power of the lattice's cells; who uses a map
 //! compares it with the flow itself and halves the cells if they were too large.
 
-use isomorph_model::{Carried, ModelBackend};
+use isomorph_training::deformation::CarriedField;
+use rayon::prelude::*;
 
-use super::chunks::in_chunks;
 use super::extract::Grid;
-use crate::tensors::{host, rows};
 
 /// The longest side of a cell of the first lattice tried, in normalised units.
 const LONGEST: f64 = 0.025;
 
 /// Points this close to a node, as a share of a cell, are taken to be on it: rounding.
 const ON_NODE: f64 = 1e-4;
+
+/// Places that a core interpolates at a time: each takes about a tenth of a microsecond.
+const PLACES_AT_LEAST: usize = 1024;
 
 /// Positions at time 0, then at time 1.
 type Ends = [f32; 6];
@@ -32,10 +34,9 @@ pub(super) fn first_stride(grid: &Grid) -> usize {
 }
 
 /// The ends of all points of a box at one time.
-pub(super) struct FlowMap<'a, B: ModelBackend> {
-    geometry: &'a dyn Carried<B>,
+pub(super) struct FlowMap<'a> {
+    field: &'a dyn CarriedField,
     time: f64,
-    device: &'a B::Device,
     /// The nodes of the map are nodes of the grid, and one before and two behind its box.
     grid: &'a Grid,
     stride: usize,
@@ -57,12 +58,11 @@ impl Place {
     }
 }
 
-impl<'a, B: ModelBackend> FlowMap<'a, B> {
+impl<'a> FlowMap<'a> {
     /// Nothing is followed yet. `stride`: cells of the grid to a cell of the lattice.
     pub(super) fn new(
-        geometry: &'a dyn Carried<B>,
+        field: &'a dyn CarriedField,
         time: f64,
-        device: &'a B::Device,
         grid: &'a Grid,
         stride: usize,
     ) -> Self {
@@ -70,9 +70,8 @@ impl<'a, B: ModelBackend> FlowMap<'a, B> {
             .cells()
             .map(|cells| (cells as usize).div_ceil(stride) + 4);
         Self {
-            geometry,
+            field,
             time,
-            device,
             grid,
             stride,
             nodes,
@@ -84,16 +83,12 @@ impl<'a, B: ModelBackend> FlowMap<'a, B> {
     pub(super) fn values(&mut self, points: &[[f32; 3]]) -> Vec<f32> {
         let places: Vec<Place> = points.iter().map(|x| self.place(*x)).collect();
         self.follow(&places);
-        let (geometry, time, device) = (self.geometry, self.time, self.device);
-        let known = &*self;
-        let values = in_chunks::<B, _, _>(&places, |places| {
-            let ends: Vec<Ends> = places
-                .iter()
-                .map(|place| known.interpolated(place))
-                .collect();
-            host(geometry.value_from(rows(&ends, device), time))
-        });
-        values.concat()
+        let ends: Vec<Ends> = places
+            .par_iter()
+            .with_min_len(PLACES_AT_LEAST)
+            .map(|place| self.interpolated(place))
+            .collect();
+        self.field.values_from(&ends, self.time)
     }
 
     /// Whether all but one in twenty of these points end as near to where the flow itself takes them as
@@ -101,7 +96,7 @@ impl<'a, B: ModelBackend> FlowMap<'a, B> {
     pub(super) fn is_close_at(&mut self, points: &[[f32; 3]]) -> bool {
         let places: Vec<Place> = points.iter().map(|x| self.place(*x)).collect();
         self.follow(&places);
-        let tolerance = self.geometry.tolerance();
+        let tolerance = self.field.tolerance();
         let far = |found: &[f32], wanted: &[f32]| {
             let off = found
                 .iter()
@@ -109,21 +104,12 @@ impl<'a, B: ModelBackend> FlowMap<'a, B> {
                 .map(|(a, b)| f64::from(a - b).powi(2));
             off.sum::<f64>() > tolerance.powi(2)
         };
-        let followed = self.followed(points);
+        let followed = self.field.ends(points, self.time);
         let off = places.iter().zip(&followed).filter(|(place, wanted)| {
             let found = self.interpolated(place);
             far(&found[..3], &wanted[..3]) || far(&found[3..], &wanted[3..])
         });
         20 * off.count() <= points.len()
-    }
-
-    /// The ends of points by the flow itself.
-    fn followed(&self, points: &[[f32; 3]]) -> Vec<Ends> {
-        let found = in_chunks::<B, _, _>(points, |points| {
-            let ends = self.geometry.ends(rows(points, self.device), self.time);
-            host(ends).as_chunks::<6>().0.to_vec()
-        });
-        found.concat()
     }
 
     /// Follows the nodes that these places need and that have not been followed before.
@@ -148,7 +134,7 @@ impl<'a, B: ModelBackend> FlowMap<'a, B> {
             }
         }
         let at: Vec<[f32; 3]> = missing.iter().map(|node| self.position(*node)).collect();
-        let found = self.followed(&at);
+        let found = self.field.ends(&at, self.time);
         for (node, ends) in missing.into_iter().zip(found) {
             self.ends[index(node, nodes)] = ends;
         }
@@ -224,11 +210,9 @@ mod tests {
     use std::sync::Arc;
     use std::sync::atomic::{AtomicUsize, Ordering};
 
-    use burn::tensor::Tensor;
-    use burn_ndarray::NdArray;
-    use isomorph_model::Geometry;
+    use isomorph_training::deformation::SurfaceField;
 
-    use super::super::trained::Trained;
+    use super::super::learned::Learned;
     use super::*;
     use crate::shape::Bounds;
 
@@ -249,42 +233,41 @@ mod tests {
             }
         }
 
-        fn by(&self, x: &Tensor<NdArray, 2>, span: f64) -> Tensor<NdArray, 2> {
-            let [n, _] = x.dims();
-            let y = x.clone().slice([0..n, 1..2]);
-            let first = (y * self.wave).sin() * (0.1 * span);
-            Tensor::cat(
-                vec![first.clone(), first.zeros_like(), first.zeros_like()],
-                1,
-            )
+        fn by(&self, y: f32, span: f64) -> f32 {
+            ((self.wave * f64::from(y)).sin() * 0.1 * span) as f32
         }
     }
 
-    impl Carried<NdArray> for Waving {
+    impl CarriedField for Waving {
         fn tolerance(&self) -> f64 {
             1e-3
         }
 
-        fn ends(&self, x: Tensor<NdArray, 2>, time: f64) -> Tensor<NdArray, 2> {
-            self.followed.fetch_add(x.dims()[0], Ordering::Relaxed);
-            let (start, end) = (self.by(&x, -time), self.by(&x, 1.0 - time));
-            Tensor::cat(vec![x.clone() + start, x + end], 1)
+        fn ends(&self, points: &[[f32; 3]], time: f64) -> Vec<[f32; 6]> {
+            self.followed.fetch_add(points.len(), Ordering::Relaxed);
+            let ends = |[x, y, z]: &[f32; 3]| {
+                let (start, end) = (self.by(*y, -time), self.by(*y, 1.0 - time));
+                [x + start, *y, *z, x + end, *y, *z]
+            };
+            points.iter().map(ends).collect()
         }
 
-        fn value_from(&self, ends: Tensor<NdArray, 2>, _: f64) -> Tensor<NdArray, 2> {
-            let [n, _] = ends.dims();
-            let start = ends.slice([0..n, 0..3]);
-            start.square().sum_dim(1).sqrt() - 0.4
+        fn values_from(&self, ends: &[[f32; 6]], _: f64) -> Vec<f32> {
+            let value = |[x, y, z, ..]: &[f32; 6]| (x * x + y * y + z * z).sqrt() - 0.4;
+            ends.iter().map(value).collect()
         }
     }
 
-    impl Geometry<NdArray> for Waving {
-        fn value(&self, x: Tensor<NdArray, 2>, t: Tensor<NdArray, 2>) -> Tensor<NdArray, 2> {
-            let time = f64::from(t.into_data().iter::<f32>().next().unwrap_or(0.0));
-            self.value_from(self.ends(x, time), time)
+    impl SurfaceField for Waving {
+        fn values(&self, points: &[[f32; 3]], time: f64) -> Vec<f32> {
+            self.values_from(&self.ends(points, time), time)
         }
 
-        fn carried(&self) -> Option<&dyn Carried<NdArray>> {
+        fn gradients(&self, points: &[[f32; 3]], _: f64) -> Vec<[f32; 3]> {
+            points.to_vec()
+        }
+
+        fn carried(&self) -> Option<&dyn CarriedField> {
             self.says.then_some(self)
         }
     }
@@ -302,9 +285,9 @@ mod tests {
 
     #[test]
     fn a_point_on_a_node_is_followed_and_one_between_nodes_interpolated() {
-        let (waving, grid, device) = (Waving::new(9.0), grid(128), Default::default());
+        let (waving, grid) = (Waving::new(9.0), grid(128));
         assert_eq!(first_stride(&grid), 2);
-        let mut map = FlowMap::new(&waving, 0.5, &device, &grid, 2);
+        let mut map = FlowMap::new(&waving, 0.5, &grid, 2);
         let nodes =
             [[0.0; 3], [4.0, 8.0, 100.0], [128.0, 106.0, 108.0]].map(|at| grid.position(at));
         let on = map.values(&nodes);
@@ -313,13 +296,10 @@ mod tests {
             3,
             "each once, alone"
         );
-        assert_eq!(
-            on,
-            host(waving.value_from(waving.ends(rows(&nodes, &device), 0.5), 0.5))
-        );
+        assert_eq!(on, waving.values(&nodes, 0.5));
         let between = [[0.5, 7.3, 99.1], [127.9, 105.0, 107.0], [64.0, 3.0, 8.0]];
         let between = between.map(|at| grid.position(at));
-        let wanted = host(waving.value_from(waving.ends(rows(&between, &device), 0.5), 0.5));
+        let wanted = waving.values(&between, 0.5);
         for (found, wanted) in map.values(&between).iter().zip(wanted) {
             // 0.05 (9 h)^4 3 / 128 with h = 0.019: 1e-6; and f32 rounding of positions near 0.5.
             assert!((found - wanted).abs() < 3e-6, "{found}, wanted {wanted}");
@@ -335,16 +315,15 @@ mod tests {
                 ..Waving::new(wave)
             };
             let followed = waving.followed.clone();
-            let trained = Trained {
+            let learned = Learned {
                 bounds: bounds(),
-                ..Trained::of_field(waving)
+                ..Learned::of_field(waving)
             };
-            let found = trained.surface_at(&grid(256), 0.5);
+            let found = learned.surface_at(&grid(256), 0.5, 0.0, &mut |_| {});
             let vertices = found.expect("a sphere has a surface").mesh.vertices;
             let followed = followed.load(Ordering::Relaxed);
             let exact = Waving::new(wave);
-            let ends = exact.ends(rows(&vertices, &trained.device), 0.5);
-            let off = host(exact.value_from(ends, 0.5)).into_iter();
+            let off = exact.values(&vertices, 0.5).into_iter();
             (
                 off.fold(0.0, |most: f32, off| most.max(off.abs())),
                 followed,

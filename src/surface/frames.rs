@@ -9,13 +9,12 @@ use std::convert::Infallible;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use isomorph_model::ModelBackend;
 use serde::{Deserialize, Serialize};
 
 use super::SurfaceMesh;
 use super::carry::{CarryError, rewrite_vertices};
 use super::extract::{ExtractError, Grid, GridError};
-use super::trained::{Found, Trained};
+use super::learned::{Found, Learned};
 use super::write::{SurfaceFormat, SurfaceView, WriteError, write_surface};
 use crate::atomic::write_atomically;
 use crate::shape::{self, ShapeError};
@@ -31,6 +30,8 @@ pub struct FrameOptions {
     pub format: SurfaceFormat,
     /// The mesh or cloud whose vertices are carried too, if any.
     pub carry: Option<PathBuf>,
+    /// Pieces with less than this share of a surface's area are left out; 0 keeps all.
+    pub smallest_component: f64,
     /// The folder that the files go to.
     pub folder: PathBuf,
 }
@@ -123,24 +124,24 @@ pub enum FramesError {
 ///
 /// # Errors
 /// [`FramesError`]. `frames.json` is removed first and written last, so a folder with one is complete.
-pub fn write_frames<B: ModelBackend>(
-    trained: &Trained<B>,
+pub fn write_frames(
+    learned: &Learned,
     options: &FrameOptions,
     mut done: impl FnMut(&Frame) -> io::Result<bool>,
 ) -> Result<Vec<Frame>, FramesError> {
-    if options.carry.is_some() && trained.motion.is_none() {
+    if options.carry.is_some() && learned.deformation.motion().is_none() {
         return Err(no_motion());
     }
-    let grid = Grid::new(trained.bounds.min, trained.bounds.max, options.resolution)?;
+    let grid = Grid::new(learned.bounds.min, learned.bounds.max, options.resolution)?;
     let listing = options.folder.join("frames.json");
     let earlier = take_listing(&listing)?;
     let carried = match &options.carry {
-        Some(source) => carry(trained, source, options)?,
+        Some(source) => carry(learned, source, options)?,
         None => vec![None; options.times.len()],
     };
     let mut frames = Vec::new();
     for (k, carried) in carried.into_iter().enumerate() {
-        let frame = write_frame(trained, options, &grid, k, carried)?;
+        let frame = write_frame(learned, options, &grid, k, carried)?;
         let go_on = done(&frame)?;
         frames.push(frame);
         if !go_on && frames.len() < options.times.len() {
@@ -163,7 +164,7 @@ pub fn write_frames<B: ModelBackend>(
 }
 
 pub(super) fn no_motion() -> FramesError {
-    let text = "this method gives a surface and moves no points: leave --carry out";
+    let text = "this method gives a surface and moves no points, so nothing can be carried";
     FramesError::NoMotion(text.to_owned())
 }
 
@@ -180,8 +181,8 @@ fn take_listing(listing: &Path) -> io::Result<Vec<FrameEntry>> {
 }
 
 /// Extracts and writes frame `k`.
-fn write_frame<B: ModelBackend>(
-    trained: &Trained<B>,
+fn write_frame(
+    learned: &Learned,
     options: &FrameOptions,
     grid: &Grid,
     k: usize,
@@ -195,19 +196,19 @@ fn write_frame<B: ModelBackend>(
         left_out,
         touches_box,
         evaluated,
-    } = trained.surface_at(grid, time)?;
-    let (normals, slope_error) = trained.normals(&mesh, time);
+    } = learned.surface_at(grid, time, options.smallest_component, &mut |_| {})?;
+    let (normals, slope_error) = learned.normals(&mesh, time);
     let vertices = mesh
         .vertices
         .iter()
-        .map(|x| trained.normalisation.invert(*x));
+        .map(|x| learned.normalisation.invert(*x));
     let view = SurfaceView {
         vertices: &vertices.collect::<Vec<[f64; 3]>>(),
         triangles: &mesh.triangles,
         normals: Some(&normals),
     };
     write_surface(view, &options.folder.join(&surface), options.format)?;
-    let agreement = trained.agreement(&mesh.vertices, time)?;
+    let agreement = learned.agreement(&mesh.vertices, time)?;
     let entry = FrameEntry {
         time,
         surface,
@@ -227,8 +228,8 @@ fn write_frame<B: ModelBackend>(
 }
 
 /// Carries the vertices of a shape through all times and writes a file for each; their names.
-fn carry<B: ModelBackend>(
-    trained: &Trained<B>,
+fn carry(
+    learned: &Learned,
     source: &Path,
     options: &FrameOptions,
 ) -> Result<Vec<Option<String>>, FramesError> {
@@ -236,7 +237,7 @@ fn carry<B: ModelBackend>(
     let start: Vec<[f32; 3]> = shape
         .vertices
         .iter()
-        .map(|x| trained.normalisation.apply(*x))
+        .map(|x| learned.normalisation.apply(*x))
         .collect();
     let extension = source
         .extension()
@@ -246,16 +247,11 @@ fn carry<B: ModelBackend>(
     order.sort_by(|a, b| options.times[*a].total_cmp(&options.times[*b]));
     let mut names = vec![None; options.times.len()];
     let times: Vec<f64> = order.iter().map(|k| options.times[*k]).collect();
-    let path = trained.path(&start, &times)?;
+    let path = learned.path(&start, &times)?;
     for (k, now) in order.into_iter().zip(path) {
         // The displacement is added to the vertex as it was read, so that time 0 gives the input back.
         let moved: Vec<[f64; 3]> = (shape.vertices.iter().zip(&start).zip(&now))
-            .map(|((vertex, start), now)| {
-                std::array::from_fn(|axis| {
-                    let by = f64::from(now[axis]) - f64::from(start[axis]);
-                    vertex[axis] + by / trained.normalisation.scale
-                })
-            })
+            .map(|((vertex, start), now)| learned.normalisation.displaced(*vertex, *start, *now))
             .collect();
         let name = format!("carried-{k:03}.{extension}");
         rewrite_vertices(source, &moved, &options.folder.join(&name))?;

@@ -9,9 +9,8 @@
 //! | `polygonise.rs` | cells joined into one mesh with shared vertices |
 //! | `components.rs` | connected pieces and filters that drop the small ones |
 //! | `flow_map.rs` | a field that a flow carries, the flow followed at few points |
-//! | `chunks.rs` | networks at many points, on all cores |
 //! | `agreement.rs` | whether a method's surfaces and its motion say the same |
-//! | `trained.rs` | a trained method: its surface at a time, where its motion takes points |
+//! | `learned.rs` | what was learned: its surface at a time, where its motion takes points |
 //! | `frames.rs` | the surfaces of chosen times, as files |
 //! | `carry.rs` | the input file again, its vertices moved |
 //! | `write.rs` | PLY and OBJ files |
@@ -22,7 +21,6 @@
 mod agreement;
 pub mod carry;
 mod cell;
-mod chunks;
 pub mod components;
 pub mod extract;
 mod flow_map;
@@ -30,7 +28,7 @@ pub mod frames;
 mod lattice;
 mod polygonise;
 mod search;
-pub mod trained;
+pub mod learned;
 pub mod write;
 
 /// Triangles over shared vertices.

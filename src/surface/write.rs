@@ -40,6 +40,15 @@ impl SurfaceFormat {
             Self::Obj => "obj",
         }
     }
+
+    /// The format that the ending of a file's name says, in either case.
+    pub(crate) fn of(path: &Path) -> Option<Self> {
+        let is = |format: &Self| {
+            let ending = path.extension();
+            ending.is_some_and(|given| given.eq_ignore_ascii_case(format.extension()))
+        };
+        [Self::Ply, Self::Obj].into_iter().find(is)
+    }
 }
 
 /// A surface in the user's coordinates, borrowed for writing.

@@ -46,7 +46,9 @@ pub mod report;
 pub mod samples;
 pub mod schedule;
 pub mod settings;
+mod spheres;
 mod tensors;
+
 mod workers;
 
 #[cfg(test)]

@@ -12,9 +12,8 @@ use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
-use super::line::line;
 use super::metrics::{self, Metrics};
-use crate::learner::event::{Event, StepReport};
+use crate::event::{Event, StepReport};
 
 /// `run.log` and `metrics.jsonl` of one run.
 #[derive(Debug)]
@@ -52,7 +51,7 @@ impl RunLog {
     /// # Errors
     /// What the file system says; the message names the file.
     pub fn record(&mut self, event: &Event) -> io::Result<()> {
-        if let Some(text) = line(event, &self.run, None) {
+        if let Some(text) = event.line(None) {
             let stamped = stamped(SystemTime::now(), &text);
             let written = self.log.write_all(stamped.as_bytes());
             written.map_err(|error| at(&self.run.join("run.log"), error))?;

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use crate::atomic::write_atomically;
-use crate::learner::event::{Phase, StepReport};
+use crate::event::{Phase, StepReport};
 
 /// The file's name in the folder of a run.
 pub const FILE: &str = "metrics.jsonl";
@@ -122,7 +122,7 @@ impl From<&StepReport> for Metrics {
 
 /// Removes every line but those of the first `steps` steps, and a torn last line; a file with nothing to
 /// remove is not touched.
-pub(super) fn keep_until(path: &Path, steps: usize) -> io::Result<()> {
+pub(crate) fn keep_until(path: &Path, steps: usize) -> io::Result<()> {
     #[derive(Deserialize)]
     struct Step {
         step: usize,
@@ -154,7 +154,7 @@ fn whole_lines(bytes: &[u8]) -> impl Iterator<Item = &[u8]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::learner::event::TermReport;
+    use crate::event::TermReport;
 
     fn report() -> StepReport {
         StepReport {

@@ -11,9 +11,11 @@ use std::time::Instant;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use super::line::{duration, line, objective};
+use isomorph::Event;
+use isomorph::event::duration;
+
 use super::pace::Pace;
-use crate::learner::event::Event;
+use super::told;
 
 /// The message takes what is left of the terminal's width and is cut there.
 const TEMPLATE: &str = "{pos:>4}/{len} [{bar:16}] {wide_msg}";
@@ -30,7 +32,7 @@ impl Screen for Stderr {
     }
 }
 
-/// Draws one bar at a time, of training or of extraction, below the lines of its events.
+/// Draws one bar at a time, of training, extraction or measuring, below the lines of its events.
 #[derive(Debug)]
 pub(super) struct Bar<S> {
     screen: S,
@@ -60,7 +62,8 @@ impl<S: Screen> Bar<S> {
         self.pace.observe(event, now);
         match event {
             Event::Tick { step } => self.advance(*step, now),
-            Event::Step(report) => self.objective = format!(", {}", objective(report)),
+            Event::Measuring { done, total } => self.measure(*done, *total),
+            Event::Step(report) => self.objective = format!(", {}", report.objective()),
             _ => self.tell(event, now),
         }
     }
@@ -70,7 +73,7 @@ impl<S: Screen> Bar<S> {
         if matches!(event, Event::Interrupted { .. } | Event::Finished { .. }) {
             self.clear();
         }
-        if let Some(text) = line(event, &self.run, None) {
+        if let Some(text) = told(event, &self.run, None) {
             self.print(&text);
         }
         match event {
@@ -117,6 +120,22 @@ impl<S: Screen> Bar<S> {
         };
         bar.set_position(step as u64);
         bar.set_message(format!("{}, {passed}{left}{}", self.phase, self.objective));
+    }
+
+    /// Frames that are measured: the bar begins with the first report and ends with the last.
+    fn measure(&mut self, done: usize, total: usize) {
+        if self.bar.is_none() {
+            self.begin(total, 0);
+        }
+        let Some(bar) = &self.bar else { return };
+        bar.set_position(done as u64);
+        bar.set_message(match done {
+            0 => "finding the best times",
+            _ => "measuring",
+        });
+        if done >= total {
+            self.clear();
+        }
     }
 
     fn extracted(&mut self) {

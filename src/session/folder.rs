@@ -12,19 +12,19 @@ use crate::atomic;
 
 /// Why a run's folder cannot be used.
 #[derive(Debug, thiserror::Error)]
-pub enum RunError {
+pub enum FolderError {
     /// Something is there already.
     #[error(
-        "{0}: exists already; resume it with `isomorph resume {0}`, choose another with --run, or replace it with --force"
+        "{0}: exists already; resume the run in it, choose another folder, or replace it"
     )]
     Exists(PathBuf),
-    /// Something is there that is not a run, which --force does not delete.
+    /// Something is there that is not a run, which is never deleted.
     #[error(
-        "{0}: exists and is not a run (it has no recipe.toml), so --force leaves it alone; choose another folder with --run"
+        "{0}: exists and is not a run (it has no recipe.toml), so it is not replaced; choose another folder"
     )]
     NotARun(PathBuf),
     /// Not a run.
-    #[error("{0}: not a run: it has no recipe.toml; give the folder that `isomorph train` made")]
+    #[error("{0}: not a run: it has no recipe.toml; name the folder that training made")]
     Missing(PathBuf),
     /// The file system refused.
     #[error("{path}: {reason}")]
@@ -36,17 +36,22 @@ pub enum RunError {
     },
 }
 
+/// Whether a folder holds a run.
+pub fn is_run(path: &Path) -> bool {
+    RunFolder::open(path).is_ok()
+}
+
 /// The folder of one run.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct RunDirectory(PathBuf);
+pub struct RunFolder(PathBuf);
 
-impl RunDirectory {
+impl RunFolder {
     /// Makes the folder of a new run and writes the resolved recipe into it.
     ///
     /// # Errors
-    /// [`RunError`]; with `force` an older run there is deleted first, and nothing but a run ever is.
-    pub fn create(path: &Path, recipe: &str, force: bool) -> Result<Self, RunError> {
-        let io = |reason| RunError::Io {
+    /// [`FolderError`]; with `replace` an older run there is deleted first, and nothing but a run ever is.
+    pub fn create(path: &Path, recipe: &str, replace: bool) -> Result<Self, FolderError> {
+        let io = |reason| FolderError::Io {
             path: path.to_path_buf(),
             reason,
         };
@@ -57,11 +62,11 @@ impl RunDirectory {
         };
         let run = Self(path.to_path_buf());
         if occupied {
-            if !force {
-                return Err(RunError::Exists(path.to_path_buf()));
+            if !replace {
+                return Err(FolderError::Exists(path.to_path_buf()));
             }
             if !run.recipe().is_file() {
-                return Err(RunError::NotARun(path.to_path_buf()));
+                return Err(FolderError::NotARun(path.to_path_buf()));
             }
             run.clear().map_err(io)?;
         }
@@ -74,13 +79,13 @@ impl RunDirectory {
     /// Opens the folder of an existing run.
     ///
     /// # Errors
-    /// [`RunError::Missing`] if it holds no recipe.
-    pub fn open(path: &Path) -> Result<Self, RunError> {
+    /// [`FolderError::Missing`] if it holds no recipe.
+    pub fn open(path: &Path) -> Result<Self, FolderError> {
         let run = Self(path.to_path_buf());
         if run.recipe().is_file() {
             Ok(run)
         } else {
-            Err(RunError::Missing(path.to_path_buf()))
+            Err(FolderError::Missing(path.to_path_buf()))
         }
     }
 
@@ -116,7 +121,7 @@ impl RunDirectory {
                 fs::remove_dir_all(folder)?;
             }
         }
-        let files = ["metrics.jsonl", "run.log", "report.html", "pairs.csv"];
+        let files = ["metrics.jsonl", "run.log", "pairs.csv"];
         // The recipe last: without it this is no run that another try may replace.
         for file in files.into_iter().chain(["recipe.toml"]) {
             match fs::remove_file(self.0.join(file)) {
@@ -149,11 +154,11 @@ mod tests {
     fn a_run_is_replaced_only_by_force_and_only_if_it_is_a_run() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = folder.path().join("run");
-        RunDirectory::create(&path, "first", false).expect("a new run");
+        RunFolder::create(&path, "first", false).expect("a new run");
         fs::write(path.join("mine.txt"), "kept").expect("a file of the user's");
-        let refused = RunDirectory::create(&path, "second", false).expect_err("it exists");
-        assert!(refused.to_string().contains("--force"), "{refused}");
-        let run = RunDirectory::create(&path, "second", true).expect("replaced");
+        let refused = RunFolder::create(&path, "second", false).expect_err("it exists");
+        assert!(refused.to_string().contains("replace it"), "{refused}");
+        let run = RunFolder::create(&path, "second", true).expect("replaced");
         assert_eq!(
             fs::read_to_string(run.recipe()).expect("a recipe"),
             "second"
@@ -163,11 +168,11 @@ mod tests {
             "what is not the run's stays"
         );
         fs::remove_file(run.recipe()).expect("no longer a run");
-        let refused = RunDirectory::create(&path, "third", true).expect_err("not a run");
-        assert!(matches!(refused, RunError::NotARun(_)), "{refused}");
+        let refused = RunFolder::create(&path, "third", true).expect_err("not a run");
+        assert!(matches!(refused, FolderError::NotARun(_)), "{refused}");
         assert!(matches!(
-            RunDirectory::open(&path),
-            Err(RunError::Missing(_))
+            RunFolder::open(&path),
+            Err(FolderError::Missing(_))
         ));
     }
 
@@ -176,7 +181,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let torn = folder.path().join(".isomorph-x1Y2z3");
         fs::write(&torn, "half a rec").expect("written");
-        RunDirectory::create(folder.path(), "whole", false).expect("a new run");
+        RunFolder::create(folder.path(), "whole", false).expect("a new run");
         assert!(!torn.exists(), "nothing torn is left");
     }
 }

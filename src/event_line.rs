@@ -6,22 +6,20 @@
 //!
 //! Values of terms are weighted, so that they add up to the total.
 
-use std::path::Path;
 use std::time::Duration;
 
-use indicatif::HumanCount;
-
-use crate::learner::event::{Event, StepReport, TermReport};
+use super::{Event, StepReport, TermReport};
 
 /// Terms that are named one by one; the others are summed.
 const NAMED_TERMS: usize = 3;
 
-/// An event of the run in this folder as a line, without its end; `None` for what needs no line.
+/// An event as a line, without its end; `None` for what needs no line.
 ///
 /// `left` is how long the remaining steps may take.
-pub(super) fn line(event: &Event, run: &Path, left: Option<Duration>) -> Option<String> {
+pub(super) fn line(event: &Event, left: Option<Duration>) -> Option<String> {
     Some(match event {
-        Event::Tick { .. } => return None,
+        Event::Tick { .. } | Event::Measuring { .. } => return None,
+        Event::Matching => "finding pairs of the two shapes".to_owned(),
         Event::Started { .. } => return started(event),
         Event::Note(text) => format!("note: {}", text.replace('\n', " ")),
         Event::Matched { .. } => return matched(event),
@@ -32,10 +30,9 @@ pub(super) fn line(event: &Event, run: &Path, left: Option<Duration>) -> Option<
         }
         Event::Extracting { frames } => format!("extracting {}", counted(*frames, "surface")),
         Event::Extracted { .. } => return extracted(event),
-        Event::Interrupted { step } => format!(
-            "interrupted after step {step}; go on with `isomorph resume {}`",
-            run.display()
-        ),
+        Event::Interrupted { step } => {
+            format!("interrupted after step {step}: the newest checkpoint holds all of it")
+        }
         Event::Finished { step, seconds } => {
             format!(
                 "finished {} in {}",
@@ -67,7 +64,7 @@ pub(super) fn objective(report: &StepReport) -> String {
 }
 
 /// Seconds as people read them: `4.2s`, `42s`, `2m05s`, `3h07m`, `2d04h`.
-pub(super) fn duration(seconds: f64) -> String {
+pub fn duration(seconds: f64) -> String {
     if seconds < 9.95 {
         return format!("{seconds:.1}s");
     }
@@ -89,8 +86,7 @@ fn started(event: &Event) -> Option<String> {
         steps,
         first_step,
         networks,
-        source_points,
-        target_points,
+        points,
         correspondences,
     } = event
     else {
@@ -104,11 +100,13 @@ fn started(event: &Event) -> Option<String> {
         .iter()
         .map(|(name, weights)| format!("{name} has {}", counted(*weights, "weight")))
         .collect();
+    let (first, others) = points.split_first()?;
+    let others = others.iter().map(|count| format!(", {}", grouped(*count)));
     Some(format!(
-        "{begun} {backend} ({device}): {}; {} on the source, {} on the target, {}",
+        "{begun} {backend} ({device}): {}; {}{} on the key frames, {}",
         networks.join(", "),
-        counted(*source_points, "point"),
-        HumanCount(*target_points as u64),
+        counted(*first, "point"),
+        others.collect::<String>(),
         counted(*correspondences, "correspondence"),
     ))
 }
@@ -190,12 +188,25 @@ fn extracted(event: &Event) -> Option<String> {
 
 /// A number of things: `1 surface`, `20,000 points`, `8 vertices`.
 fn counted(count: usize, thing: &str) -> String {
-    let number = HumanCount(count as u64);
+    let number = grouped(count);
     match (count, thing) {
         (1, _) => format!("1 {thing}"),
         (_, "vertex") => format!("{number} vertices"),
         _ => format!("{number} {thing}s"),
     }
+}
+
+/// Digits in threes: `20,000`.
+fn grouped(count: usize) -> String {
+    let digits = count.to_string();
+    let mut grouped = String::new();
+    for (place, digit) in digits.chars().enumerate() {
+        if place > 0 && (digits.len() - place).is_multiple_of(3) {
+            grouped.push(',');
+        }
+        grouped.push(digit);
+    }
+    grouped
 }
 
 /// Three significant digits: `0.00123`, `1.23`, `12.3`, `123`, `1.23e-6`.
@@ -221,5 +232,5 @@ fn significant(value: f64) -> String {
 }
 
 #[cfg(test)]
-#[path = "line_tests.rs"]
+#[path = "event_line_tests.rs"]
 mod tests;

@@ -1,7 +1,7 @@
 //! What the bar draws, on a screen that only takes notes.
 
 use super::*;
-use crate::learner::event::{Phase, StepReport, TermReport};
+use isomorph::event::{Phase, StepReport, TermReport};
 use indicatif::TermLike;
 use std::io;
 use std::sync::{Arc, Mutex};

@@ -1,11 +1,14 @@
-//! Two files in, everything that training needs of them out: [`prepare`].
+//! Shapes in, everything that training needs of them out: [`prepare`].
 //!
 //! A mesh is sampled by area, with the normals of its faces; a cloud is used as it is, with its own
 //! normals or estimated ones. Whatever was decided about the data on the way is said in
-//! [`Pair::notes`].
+//! [`Keyframes::notes`].
 
+use std::num::NonZeroUsize;
 use std::path::PathBuf;
+use std::sync::OnceLock;
 
+use isomorph_training::data::{KeyPoints, PointPair, Surroundings, TrainingData};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -13,8 +16,8 @@ use super::mesh::{self, EdgeSharing};
 use super::sample::point_at;
 use super::winding::is_inside_out;
 use super::{
-    Bounds, Correspondences, FEWEST_POINTS, Normalisation, Shape, ShapeError, estimate_normals,
-    sample_surface,
+    Bounds, Correspondences, FEWEST_POINTS, NeighbourSearch, Normalisation, Shape, ShapeError,
+    SignedDistance, estimate_normals, sample_surface,
 };
 
 /// Where correspondences come from.
@@ -43,18 +46,17 @@ pub enum NormalSource {
     None,
 }
 
-/// What to make of which files: the data section of a recipe.
+/// What to make of which shapes: the data section of a recipe.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DataOptions {
-    /// The shape at time 0.
-    pub source: PathBuf,
-    /// The shape at time 1.
-    pub target: PathBuf,
-    /// Where pairs of corresponding points come from.
-    pub correspondences: CorrespondenceSource,
+    /// The times of the key frames, ascending from 0 to 1; at least two.
+    pub times: Vec<f64>,
+    /// Where pairs of corresponding points come from: entry `k` from key frame `k` to the one after it.
+    pub between: Vec<CorrespondenceSource>,
     /// Points sampled on each mesh; a cloud is used as it is.
     pub points: usize,
-    /// Correspondences used, as a fraction of the source's points, when that many are available.
+    /// Correspondences used between two key frames, as a fraction of the earlier one's points, when that
+    /// many are available.
     pub correspondence_fraction: f64,
     /// Where normals come from.
     pub normals: NormalSource,
@@ -71,83 +73,125 @@ pub struct Cloud {
     pub normals: Option<Vec<[f32; 3]>>,
 }
 
-/// Two shapes made ready for training.
+/// A shape at its time, as points.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Pair {
-    /// The shape at time 0.
-    pub source: Cloud,
-    /// The shape at time 1.
-    pub target: Cloud,
-    /// Points of the source with the points of the target that they move to, normalised.
-    pub correspondences: Vec<([f32; 3], [f32; 3])>,
+pub struct Keyframe {
+    /// Its time, 0 to 1.
+    pub time: f64,
+    /// Its points, normalised.
+    pub cloud: Cloud,
+}
+
+/// Two or more shapes at their times, made ready for training.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Keyframes {
+    /// The key frames, in the order of their times.
+    pub keys: Vec<Keyframe>,
+    /// Points with the points that they move to, normalised: entry `k` from key frame `k` to the next.
+    pub between: Vec<Vec<PointPair>>,
     /// The way between the user's coordinates and these.
     pub normalisation: Normalisation,
-    /// The box around both shapes, normalised.
+    /// The box around all of them, normalised.
     pub bounds: Bounds,
-    /// What the user should be told about the data, one sentence each.
+    /// What was decided about the data, one sentence each.
     pub notes: Vec<String>,
 }
 
-impl Pair {
-    /// Two spheres of points of radius 0.28 with normals, the second 0.2 further along x, of which the
-    /// first `known` points are known to correspond: shapes for measuring and testing that need no file.
-    pub fn spheres(points: usize, known: usize) -> Self {
-        let normals: Vec<[f32; 3]> = (0..points)
-            .map(|k| {
-                // A Fibonacci lattice: even, and the same everywhere.
-                let z = 1.0 - (2 * k + 1) as f64 / points as f64;
-                let (ring, angle) = ((1.0 - z * z).sqrt(), 2.399_963 * k as f64);
-                [ring * angle.cos(), ring * angle.sin(), z].map(|c| c as f32)
-            })
-            .collect();
-        let cloud = |offset: f32| Cloud {
-            points: normals
-                .iter()
-                .map(|[x, y, z]| [0.28 * x + offset, 0.28 * y, 0.28 * z])
-                .collect(),
-            normals: Some(normals.clone()),
-        };
-        let (source, target) = (cloud(-0.1), cloud(0.1));
-        let pairs = source.points.iter().copied();
-        let pairs = pairs.zip(target.points.iter().copied());
+impl Keyframes {
+    /// How many correspondences are known in all.
+    pub fn pair_count(&self) -> usize {
+        self.between.iter().map(Vec::len).sum()
+    }
+
+    /// The points as methods sample them.
+    pub fn training_data(&self) -> TrainingData {
+        let keys = self.keys.iter().map(|key| KeyPoints {
+            time: key.time as f32,
+            points: key.cloud.points.clone(),
+            normals: key.cloud.normals.clone(),
+            around: Box::new(Around::new(&key.cloud)),
+        });
+        TrainingData::new(keys.collect(), self.between.clone())
+    }
+}
+
+/// Searches around a cloud, each made on its first use: most methods need none.
+struct Around {
+    cloud: Cloud,
+    distance: OnceLock<SignedDistance>,
+    search: OnceLock<NeighbourSearch>,
+}
+
+impl Around {
+    fn new(cloud: &Cloud) -> Self {
         Self {
-            correspondences: pairs.take(known).collect(),
-            normalisation: Normalisation {
-                centre: [0.0; 3],
-                scale: 1.0,
-            },
-            bounds: Bounds::of(&source.points).union(&Bounds::of(&target.points)),
-            notes: Vec::new(),
-            source,
-            target,
+            cloud: cloud.clone(),
+            distance: OnceLock::new(),
+            search: OnceLock::new(),
         }
     }
 }
 
-/// What is drawn at random; each has its own stream, so that no choice shifts another.
+impl Surroundings for Around {
+    fn signed_distance(&self, x: [f32; 3]) -> Option<f32> {
+        let normals = self.cloud.normals.as_ref()?;
+        let distance = self
+            .distance
+            .get_or_init(|| SignedDistance::new(&self.cloud.points, normals));
+        Some(distance.at(x))
+    }
+
+    fn nearest(&self, point: usize, count: NonZeroUsize) -> Vec<usize> {
+        let search = self.search.get_or_init(|| {
+            let points = self.cloud.points.iter();
+            let points: Vec<[f64; 3]> = points.map(|point| point.map(f64::from)).collect();
+            NeighbourSearch::new(&points)
+        });
+        let found = search.nearest(self.cloud.points[point].map(f64::from), count);
+        found.iter().map(|found| found.index as usize).collect()
+    }
+}
+
+/// What is drawn at random; each has its own stream, so that no choice shifts another. The numbers are those
+/// of two shapes from the first release on: they stay, so that a seed keeps its samples.
 #[derive(Clone, Copy)]
 enum Draw {
-    Source,
-    Target,
-    Correspondences,
+    /// Of the key frame with this number.
+    Points(usize),
+    /// From the key frame with this number to the next.
+    Correspondences(usize),
 }
+
+/// The most key frames whose points have streams of their own below those of training.
+const STREAMS: u64 = 1 << 40;
 
 impl Draw {
     fn generator(self, seed: u64) -> ChaCha8Rng {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        rng.set_stream(self as u64);
+        rng.set_stream(match self {
+            Self::Points(key @ 0..=1) => key as u64,
+            Self::Correspondences(0) => 2,
+            // Far above the streams of training.
+            Self::Points(key) => u64::MAX - STREAMS + key as u64,
+            Self::Correspondences(key) => u64::MAX - 2 * STREAMS + key as u64,
+        });
         rng
     }
 }
 
-/// Reads, normalises and samples both shapes and picks the correspondences.
+/// Normalises and samples the shapes, one for each time of the options, and picks the correspondences.
 ///
-/// The same options and files give the same pair.
+/// The same options and shapes give the same key frames.
 ///
 /// # Errors
-/// What [`super::read`] and [`Correspondences`] refuse; fewer than [`FEWEST_POINTS`] points; a
-/// fraction that leaves no correspondence; normals asked of a cloud that has none.
-pub fn prepare(options: &DataOptions) -> Result<Pair, ShapeError> {
+/// What [`Correspondences`] refuses; fewer than [`FEWEST_POINTS`] points; a fraction that leaves no
+/// correspondence; normals taken from a cloud that has none.
+///
+/// # Panics
+/// If there is not one shape for each time, or not one source of correspondences between each two.
+pub fn prepare(shapes: &[Shape], options: &DataOptions) -> Result<Keyframes, ShapeError> {
+    assert_eq!(shapes.len(), options.times.len(), "a shape for each time");
+    assert_eq!(shapes.len(), options.between.len() + 1, "a source between");
     if options.points < FEWEST_POINTS {
         return Err(ShapeError::Option {
             option: "points",
@@ -155,36 +199,34 @@ pub fn prepare(options: &DataOptions) -> Result<Pair, ShapeError> {
             allowed: format!("{FEWEST_POINTS} or more"),
         });
     }
-    let source = super::read(&options.source)?;
-    let target = super::read(&options.target)?;
-    let normalisation = Normalisation::joint(&[&source, &target])?;
-    let correspondences = correspondences(options, &source, &target)?;
-    let correspondences = correspondences
-        .into_iter()
-        .map(|(from, to)| (normalisation.apply(from), normalisation.apply(to)))
-        .collect();
+    let normalisation = Normalisation::joint(&shapes.iter().collect::<Vec<_>>())?;
+    let mut between = Vec::with_capacity(options.between.len());
+    for (k, source) in options.between.iter().enumerate() {
+        let rng = Draw::Correspondences(k).generator(options.seed);
+        let pairs = correspondences(options, source, [&shapes[k], &shapes[k + 1]], rng)?;
+        let place = |(from, to)| (normalisation.apply(from), normalisation.apply(to));
+        between.push(pairs.into_iter().map(place).collect());
+    }
     let mut notes = Vec::new();
-    let mut cloud = |shape: &Shape, draw: Draw| {
-        let mut rng = draw.generator(options.seed);
-        points_of(shape, options.points, options.normals, &mut rng, &mut notes).map(
-            |(points, normals)| Cloud {
-                points: points
-                    .into_iter()
-                    .map(|point| normalisation.apply(point))
-                    .collect(),
-                normals,
-            },
-        )
-    };
-    let source = cloud(&source, Draw::Source)?;
-    let target = cloud(&target, Draw::Target)?;
-    let bounds = Bounds::of(&source.points).union(&Bounds::of(&target.points));
-    Ok(Pair {
-        source,
-        target,
-        correspondences,
+    let mut keys = Vec::with_capacity(shapes.len());
+    for (k, (shape, &time)) in shapes.iter().zip(&options.times).enumerate() {
+        let mut rng = Draw::Points(k).generator(options.seed);
+        let (points, normals) =
+            points_of(shape, options.points, options.normals, &mut rng, &mut notes)?;
+        let points = points.into_iter().map(|point| normalisation.apply(point));
+        let cloud = Cloud {
+            points: points.collect(),
+            normals,
+        };
+        keys.push(Keyframe { time, cloud });
+    }
+    let boxes = keys.iter().map(|key| Bounds::of(&key.cloud.points));
+    let bounds = boxes.reduce(|all, next| all.union(&next));
+    Ok(Keyframes {
+        bounds: bounds.expect("at least two key frames"),
+        keys,
+        between,
         normalisation,
-        bounds,
         notes,
     })
 }
@@ -291,13 +333,14 @@ fn outward(
 /// Corresponding points in the user's coordinates.
 type PointPairs = Vec<([f64; 3], [f64; 3])>;
 
-/// The correspondences that the options ask for.
+/// The correspondences of two shapes that the options ask for.
 fn correspondences(
     options: &DataOptions,
-    source: &Shape,
-    target: &Shape,
+    from: &CorrespondenceSource,
+    [source, target]: [&Shape; 2],
+    mut rng: ChaCha8Rng,
 ) -> Result<PointPairs, ShapeError> {
-    let available = match &options.correspondences {
+    let available = match from {
         CorrespondenceSource::None => return Ok(Vec::new()),
         CorrespondenceSource::File(path) => Correspondences::read_csv(path, source, target)?,
         CorrespondenceSource::SameVertices => Correspondences::same_vertices(source, target)?,
@@ -320,8 +363,7 @@ fn correspondences(
             ),
         });
     }
-    let mut rng = Draw::Correspondences.generator(options.seed);
-    let shared = options.correspondences == CorrespondenceSource::SameVertices;
+    let shared = *from == CorrespondenceSource::SameVertices;
     if shared && source.is_mesh() && source.triangles == target.triangles {
         return Ok(surface_pairs(source, target, count, &mut rng));
     }

@@ -16,19 +16,14 @@ use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use burn::record::{FullPrecisionSettings, NamedMpkBytesRecorder, Record, Recorder};
-use burn::tensor::backend::Backend;
+use isomorph_training::records::{RecordError, Records};
 use serde::{Deserialize, Serialize};
 
-use super::method::Records;
 use crate::recipe::{Recipe, RecipeError};
 use crate::shape::{Bounds, Normalisation};
 
 /// The layout of a checkpoint; raised when an older isomorph could not read it.
 pub const FORMAT_VERSION: u32 = 1;
-
-/// The burn release whose records a checkpoint holds.
-pub const BURN_VERSION: &str = "0.21.0";
 
 const STATE: &str = "state.json";
 
@@ -49,8 +44,6 @@ pub struct State {
     pub seed: u64,
     /// The backend that made the last step.
     pub backend: String,
-    /// A checksum of the network sections of the recipe.
-    pub network_digest: String,
     /// From the user's coordinates to the network's.
     pub normalisation: Normalisation,
     /// The bounds of both shapes, normalised.
@@ -91,7 +84,7 @@ pub enum CheckpointError {
         reason: io::Error,
     },
     /// There is none to start from.
-    #[error("{0}: no checkpoint here; start the run with `isomorph train`")]
+    #[error("{0}: no checkpoint here: the run has not come that far, or was moved without them")]
     None(PathBuf),
     /// A file is not what was written.
     #[error(
@@ -177,51 +170,40 @@ impl Checkpoint {
         )?)
     }
 
-    /// Reads the record in a file, checked against its digest.
+    /// Networks and optimiser states, each file checked against its digest.
     ///
     /// # Errors
-    /// [`CheckpointError::Damaged`] if it is not what was written.
-    pub fn load<B: Backend, R: Record<B>>(
-        &self,
-        file: &str,
-        device: &B::Device,
-    ) -> Result<R, CheckpointError> {
-        let path = self.path.join(file);
-        let content = fs::read(&path).map_err(|reason| CheckpointError::Io {
-            path: path.clone(),
-            reason,
-        })?;
-        let damaged = |problem| CheckpointError::Damaged {
-            path: path.clone(),
-            problem,
+    /// [`CheckpointError::Damaged`] if one is not what was written, [`CheckpointError::Io`] if it cannot be
+    /// read.
+    pub fn records(&self) -> Result<Records, CheckpointError> {
+        let read = |(file, wanted): (&String, &FileDigest)| {
+            let path = self.path.join(file);
+            let content = fs::read(&path).map_err(|reason| CheckpointError::Io {
+                path: path.clone(),
+                reason,
+            })?;
+            let found = FileDigest::of(&content);
+            if found.bytes != wanted.bytes {
+                let problem = format!("{} bytes, {} written", found.bytes, wanted.bytes);
+                return Err(CheckpointError::Damaged { path, problem });
+            }
+            if found != *wanted {
+                let problem = "its checksum is not the one written".to_owned();
+                return Err(CheckpointError::Damaged { path, problem });
+            }
+            Ok((file.clone(), content))
         };
-        let found = FileDigest::of(&content);
-        match self.state.files.get(file) {
-            None => return Err(damaged(format!("not named in {STATE}"))),
-            Some(wanted) if wanted.bytes != found.bytes => {
-                return Err(damaged(format!(
-                    "{} bytes, {} written",
-                    found.bytes, wanted.bytes
-                )));
-            }
-            Some(wanted) if *wanted != found => {
-                return Err(damaged("its checksum is not the one written".to_owned()));
-            }
-            Some(_) => {}
-        }
-        let recorder = NamedMpkBytesRecorder::<FullPrecisionSettings>::default();
-        Recorder::<B>::load(&recorder, content, device).map_err(|error| damaged(error.to_string()))
+        let files = self.state.files.iter().map(read);
+        Ok(Records(files.collect::<Result<_, _>>()?))
     }
-}
 
-/// The bytes of a record.
-///
-/// # Errors
-/// What burn's recorder says.
-pub fn encode<B: Backend>(record: impl Record<B>) -> io::Result<Vec<u8>> {
-    let recorder = NamedMpkBytesRecorder::<FullPrecisionSettings>::default();
-    Recorder::<B>::record(&recorder, record, ())
-        .map_err(|error| io::Error::other(error.to_string()))
+    /// A record of this checkpoint that is not what the method takes.
+    pub fn damaged(&self, error: RecordError) -> CheckpointError {
+        CheckpointError::Damaged {
+            path: self.path.join(error.file),
+            problem: error.problem,
+        }
+    }
 }
 
 /// Writes a checkpoint into `folder` and deletes all but the `keep` newest there; returns its path.

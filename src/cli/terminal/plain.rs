@@ -4,9 +4,9 @@ use std::io::Write;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use super::line::line;
+use super::told;
 use super::pace::Pace;
-use crate::learner::event::{Event, StepReport};
+use isomorph::event::{Event, StepReport};
 
 /// Steps are shown at most this often.
 const INTERVAL: Duration = Duration::from_secs(5);
@@ -39,7 +39,7 @@ impl<W: Write> PlainLines<W> {
             }
             self.shown = Some(now);
         }
-        if let Some(text) = line(event, &self.run, self.pace.left()) {
+        if let Some(text) = told(event, &self.run, self.pace.left()) {
             // In one write, so that lines of other processes do not get into it. Nobody may be
             // reading any more; that is no reason to stop training.
             let _ = self.out.write_all(format!("{text}\n").as_bytes());
@@ -59,7 +59,7 @@ impl<W: Write> PlainLines<W> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::learner::event::{Phase, TermReport};
+    use isomorph::event::{Phase, TermReport};
     use std::path::Path;
 
     fn report(step: usize, total: f64) -> Event {

@@ -1,7 +1,7 @@
 //! The files of a run, through kill and resume.
 
 use super::*;
-use crate::learner::event::Phase;
+use crate::event::Phase;
 use std::fs;
 use std::time::{Duration, UNIX_EPOCH};
 

@@ -7,7 +7,7 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-use crate::learner::event::Event;
+use isomorph::event::Event;
 
 /// Older marks are forgotten.
 const WINDOW: Duration = Duration::from_secs(30);
@@ -74,7 +74,7 @@ impl Pace {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::learner::event::Phase;
+    use isomorph::event::Phase;
 
     /// Exact up to the rounding of a division in f64 and to whole nanoseconds.
     fn assert_left(pace: &Pace, seconds: f64) {

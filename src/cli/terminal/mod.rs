@@ -3,15 +3,19 @@
 //! A bar needs a terminal that can redraw and somebody who looks at it: with `NO_COLOR` or `CI` set, with
 //! `TERM=dumb`, or into a file or a pipe, plain lines come instead.
 
+mod bar;
+mod pace;
+mod plain;
+
 use std::ffi::OsString;
 use std::io::{self, IsTerminal, Stderr};
 use std::path::Path;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
-use super::Verbosity;
-use super::bar::Bar;
-use super::plain::PlainLines;
-use crate::learner::event::Event;
+use isomorph::Event;
+
+use bar::Bar;
+use plain::PlainLines;
 
 /// Standard error, as far as the events of a run go.
 #[derive(Debug)]
@@ -26,16 +30,16 @@ enum View {
 
 impl Terminal {
     /// Looks at the environment and chooses how to show the run in this folder.
-    pub fn new(run: &Path, verbosity: Verbosity) -> Self {
+    pub fn new(run: &Path, quiet: bool) -> Self {
         let redraws = redraws(io::stderr().is_terminal(), |name| std::env::var_os(name));
-        Self(match verbosity {
-            Verbosity::Quiet => View::Nothing,
-            Verbosity::Normal if redraws => View::Bar(Box::new(Bar::new(
+        Self(match quiet {
+            true => View::Nothing,
+            false if redraws => View::Bar(Box::new(Bar::new(
                 io::stderr(),
                 run.to_path_buf(),
                 Instant::now(),
             ))),
-            Verbosity::Normal => View::Lines(PlainLines::new(io::stderr(), run.to_path_buf())),
+            false => View::Lines(PlainLines::new(io::stderr(), run.to_path_buf())),
         })
     }
 
@@ -48,6 +52,17 @@ impl Terminal {
             View::Bar(bar) => bar.show(event, now),
         }
     }
+}
+
+/// An event as a line for somebody at a terminal, who can type a command.
+fn told(event: &Event, run: &Path, left: Option<Duration>) -> Option<String> {
+    let text = event.line(left)?;
+    Some(match event {
+        Event::Interrupted { .. } => {
+            format!("{text}; go on with `isomorph resume {}`", run.display())
+        }
+        _ => text,
+    })
 }
 
 /// Whether a bar can be drawn, by the environment's variables.

@@ -1,18 +1,16 @@
 //! A trained method as the evaluation asks for it, and how it is measured.
 
 use std::ops::ControlFlow;
-use std::sync::atomic::{AtomicBool, Ordering};
 
-use anyhow::Result;
-use indicatif::{ProgressBar, ProgressStyle};
-use isomorph_model::ModelBackend;
-
+use crate::error::{Error, Result};
 use crate::evaluate::{Candidate, Carried, EvaluateError, Evaluation, Mesh, Purpose, Reference};
+use crate::event::Event;
+use crate::session::stop::StopFlag;
 use crate::shape::Normalisation;
 use crate::surface::SurfaceMesh;
 use crate::surface::extract::{ExtractError, Grid, GridError};
 use crate::surface::frames::FramesError;
-use crate::surface::trained::{Surface, Trained};
+use crate::surface::learned::Learned;
 
 /// Cells along the longest side where a surface only serves to find the best times.
 const COARSE: usize = 48;
@@ -22,20 +20,23 @@ const COARSE: usize = 48;
 const ANCHORS: f64 = 16.0;
 
 /// Where and how closely a method is measured.
-pub(super) struct Ruler<'a> {
+pub struct Ruler<'a> {
     /// The true frames.
     pub reference: &'a Reference,
     /// The coordinates of the true frames: those of the true ends, whatever the method was given.
     pub normalisation: Normalisation,
     /// Cells along the longest side of the box.
     pub resolution: usize,
+    /// Pieces with less than this share of a surface's area are left out.
+    pub smallest_component: f64,
     /// Set to stop.
-    pub stop: &'a AtomicBool,
+    pub stop: &'a StopFlag,
 }
 
 /// A method with the grids on which its surfaces are found.
-struct Measured<'a, B: ModelBackend> {
-    trained: &'a Trained<B>,
+struct Measured<'a> {
+    learned: &'a Learned,
+    smallest: f64,
     truth: Normalisation,
     fine: Grid,
     coarse: Grid,
@@ -44,11 +45,12 @@ struct Measured<'a, B: ModelBackend> {
     anchor: Option<(f64, Option<SurfaceMesh>)>,
 }
 
-impl<'a, B: ModelBackend> Measured<'a, B> {
-    fn new(trained: &'a Trained<B>, ruler: &Ruler) -> Result<Self, GridError> {
-        let grid = |cells| Grid::new(trained.bounds.min, trained.bounds.max, cells);
+impl<'a> Measured<'a> {
+    fn new(learned: &'a Learned, ruler: &Ruler) -> Result<Self, GridError> {
+        let grid = |cells| Grid::new(learned.bounds.min, learned.bounds.max, cells);
         Ok(Self {
-            trained,
+            learned,
+            smallest: ruler.smallest_component,
             truth: ruler.normalisation,
             fine: grid(ruler.resolution)?,
             coarse: grid(ruler.resolution.min(COARSE))?,
@@ -58,7 +60,10 @@ impl<'a, B: ModelBackend> Measured<'a, B> {
 
     /// The zero set of the method's field; `None` where it is empty.
     fn extracted(&self, grid: &Grid, time: f64) -> Result<Option<SurfaceMesh>, FramesError> {
-        match self.trained.surface_at(grid, time) {
+        match self
+            .learned
+            .surface_at(grid, time, self.smallest, &mut |_| {})
+        {
             Ok(found) => Ok(Some(found.mesh)),
             // The field has one sign in the whole box: the surface has vanished.
             Err(FramesError::Extract {
@@ -82,19 +87,19 @@ impl<'a, B: ModelBackend> Measured<'a, B> {
             return Ok(None);
         };
         if time != near {
-            mesh.vertices = self.trained.carry(&mesh.vertices, near, time)?;
+            mesh.vertices = self.learned.carry(&mesh.vertices, near, time)?;
         }
         Ok(Some(mesh))
     }
 
     /// From the method's coordinates to those of the truth.
     fn measured(&self, points: Vec<[f32; 3]>) -> Vec<[f32; 3]> {
-        between(&self.trained.normalisation, &self.truth, points)
+        between(&self.learned.normalisation, &self.truth, points)
     }
 
     /// From the coordinates of the truth to the method's.
     fn learnt(&self, points: &[[f32; 3]]) -> Vec<[f32; 3]> {
-        between(&self.truth, &self.trained.normalisation, points.to_vec())
+        between(&self.truth, &self.learned.normalisation, points.to_vec())
     }
 }
 
@@ -107,17 +112,17 @@ fn between(from: &Normalisation, to: &Normalisation, points: Vec<[f32; 3]>) -> V
     points.map(|point| to.apply(from.invert(point))).collect()
 }
 
-impl<B: ModelBackend> Candidate for Measured<'_, B> {
+impl Candidate for Measured<'_> {
     type Error = FramesError;
 
     /// The zero set of the method's field, where it is not empty; a method that only carries the source's
     /// mesh has no surface beside that one.
     fn surface(&mut self, time: f64, purpose: Purpose) -> Result<Option<Mesh>, FramesError> {
-        if matches!(self.trained.shape, Surface::Template(_)) {
+        if self.learned.deformation.field().is_none() {
             return Ok(None);
         }
         let mesh = match purpose {
-            Purpose::Aligning if self.trained.surface_is_carried() => self.near_anchor(time)?,
+            Purpose::Aligning if self.learned.surface_is_carried() => self.near_anchor(time)?,
             Purpose::Aligning => self.extracted(&self.coarse, time)?,
             Purpose::Measured => self.extracted(&self.fine, time)?,
         };
@@ -133,57 +138,49 @@ impl<B: ModelBackend> Candidate for Measured<'_, B> {
         start: &[[f32; 3]],
         times: &[f64],
     ) -> Result<Option<Carried>, FramesError> {
-        if self.trained.motion.is_none() {
+        if self.learned.deformation.motion().is_none() {
             return Ok(None);
         }
-        let path = self.trained.path(&self.learnt(start), times)?;
+        let path = self.learned.path(&self.learnt(start), times)?;
         Ok(Some(path.into_iter().map(|at| self.measured(at)).collect()))
     }
 
     fn slope_error(&mut self, points: &[[f32; 3]], time: f64) -> Result<Option<f64>, FramesError> {
-        Ok(self.trained.slope_error(&self.learnt(points), time))
+        Ok(self.learned.slope_error(&self.learnt(points), time))
     }
 }
 
-/// Measures a method against a reference, with a bar on the terminal; `None` if it was stopped.
+/// Measures a method against a reference, and reports how far that has come.
 ///
 /// # Errors
-/// What keeps the method from being measured: a field that is not finite, for one.
-pub(super) fn measure<B: ModelBackend>(
-    trained: &Trained<B>,
+/// Of kind [`Interruption`](crate::ErrorKind::Interruption) if it was stopped; else what keeps the method
+/// from being measured: a field that is not finite, for one.
+pub fn measure(
+    learned: &Learned,
     ruler: &Ruler,
-) -> Result<Option<Evaluation>> {
-    let mut measured = Measured::new(trained, ruler)?;
-    let bar = ProgressBar::new(ruler.reference.frames().len() as u64);
-    let style =
-        ProgressStyle::with_template("{pos:>4}/{len} [{bar:16}] {msg}, {elapsed}, {eta} left");
-    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-    let result = ruler.reference.evaluate(&mut measured, |done, _| {
-        bar.set_message(if done == 0 { "aligning" } else { "measuring" });
-        bar.set_position(done as u64);
-        if ruler.stop.load(Ordering::Relaxed) {
+    on_event: &mut dyn FnMut(&Event),
+) -> Result<Evaluation> {
+    let mut measured = Measured::new(learned, ruler)?;
+    let result = ruler.reference.evaluate(&mut measured, |done, total| {
+        on_event(&Event::Measuring { done, total });
+        if ruler.stop.is_set() {
             ControlFlow::Break(())
         } else {
             ControlFlow::Continue(())
         }
     });
-    bar.finish_and_clear();
-    match result {
-        Ok(evaluation) => Ok(Some(evaluation)),
-        Err(EvaluateError::Stopped { .. }) => Ok(None),
-        Err(error) => Err(anyhow::anyhow!("{error}")),
-    }
+    result.map_err(|error| match error {
+        EvaluateError::Stopped { .. } => Error::interruption(error.to_string()),
+        _ => Error::failure(error),
+    })
 }
 
 #[cfg(test)]
 mod tests {
-    use burn::tensor::Tensor;
-    use burn_ndarray::NdArray;
-    use isomorph_model::{Carried as CarriedGeometry, Geometry, Motion};
+    use isomorph_training::deformation::{CarriedField, PointMotion, SurfaceField};
 
     use super::*;
-
-    type Points = Tensor<NdArray, 2>;
+    use crate::surface::learned::testing::Given;
 
     /// A ball of radius 0.3 about `(0.4 t - 0.2, 0, 0)`.
     struct Ball {
@@ -192,55 +189,74 @@ mod tests {
     }
 
     /// Along the first axis by `0.4 span`.
-    fn moved(x: Points, span: f64) -> Points {
-        let by = Tensor::<NdArray, 1>::from_floats([0.4 * span, 0.0, 0.0], &x.device());
-        x + by.unsqueeze()
+    fn moved([x, y, z]: &[f32; 3], span: f64) -> [f32; 3] {
+        [x + (0.4 * span) as f32, *y, *z]
     }
 
-    impl CarriedGeometry<NdArray> for Ball {
+    impl CarriedField for Ball {
         fn tolerance(&self) -> f64 {
             1e-3
         }
 
-        fn ends(&self, x: Points, time: f64) -> Points {
-            Tensor::cat(vec![moved(x.clone(), -time), moved(x, 1.0 - time)], 1)
+        fn ends(&self, points: &[[f32; 3]], time: f64) -> Vec<[f32; 6]> {
+            let ends = |x: &[f32; 3]| {
+                let ([a, b, c], [d, e, f]) = (moved(x, -time), moved(x, 1.0 - time));
+                [a, b, c, d, e, f]
+            };
+            points.iter().map(ends).collect()
         }
 
-        fn value_from(&self, ends: Points, _: f64) -> Points {
-            let start = ends.clone().slice([0..ends.dims()[0], 0..3]);
-            moved(start, 0.5).square().sum_dim(1).sqrt() - 0.3
+        fn values_from(&self, ends: &[[f32; 6]], _: f64) -> Vec<f32> {
+            let value = |[x, y, z, ..]: &[f32; 6]| {
+                let [x, y, z] = moved(&[*x, *y, *z], 0.5);
+                (x * x + y * y + z * z).sqrt() - 0.3
+            };
+            ends.iter().map(value).collect()
         }
     }
 
-    impl Geometry<NdArray> for Ball {
-        fn value(&self, x: Points, t: Points) -> Points {
-            let time = f64::from(t.into_data().iter::<f32>().next().unwrap_or(0.0));
-            self.value_from(self.ends(x, time), time)
+    impl SurfaceField for Ball {
+        fn values(&self, points: &[[f32; 3]], time: f64) -> Vec<f32> {
+            self.values_from(&self.ends(points, time), time)
         }
 
-        fn carried(&self) -> Option<&dyn CarriedGeometry<NdArray>> {
+        fn gradients(&self, points: &[[f32; 3]], _: f64) -> Vec<[f32; 3]> {
+            points.to_vec()
+        }
+
+        fn carried(&self) -> Option<&dyn CarriedField> {
             self.says.then_some(self)
         }
     }
 
     struct Right;
 
-    impl Motion<NdArray> for Right {
-        fn carry(&self, x: Points, from: f64, to: f64) -> Points {
-            moved(x, to - from)
+    impl PointMotion for Right {
+        fn carry(&self, points: &[[f32; 3]], from: f64, to: f64) -> Vec<[f32; 3]> {
+            points.iter().map(|x| moved(x, to - from)).collect()
+        }
+
+        fn path(&self, start: &[[f32; 3]], times: &[f64]) -> Vec<Vec<[f32; 3]>> {
+            let at = |time: &f64| self.carry(start, 0.0, *time);
+            times.iter().map(at).collect()
+        }
+
+        fn velocities(&self, points: &[[f32; 3]], _: f64) -> Vec<[f32; 3]> {
+            vec![[0.4, 0.0, 0.0]; points.len()]
         }
     }
 
     /// The least and the greatest first coordinate of the surface to align with, at times in turn.
     fn reach(says: bool, times: &[f64]) -> Vec<[f64; 2]> {
-        let trained = Trained {
-            motion: Some(Box::new(Right)),
-            ..Trained::of_field(Ball { says })
-        };
-        let grid = |cells| Grid::new(trained.bounds.min, trained.bounds.max, cells);
+        let learned = Learned::of(Given {
+            field: Some(Ball { says }),
+            motion: Some(Right),
+        });
+        let grid = |cells| Grid::new(learned.bounds.min, learned.bounds.max, cells);
         let mut measured = Measured {
-            trained: &trained,
-            truth: trained.normalisation,
+            learned: &learned,
+            smallest: 0.0,
+            truth: learned.normalisation,
             fine: grid(64).expect("a good grid"),
             coarse: grid(COARSE).expect("a good grid"),
             anchor: None,

@@ -1,52 +1,19 @@
-//! The learner: the loop that trains a method, from the first step or from a checkpoint.
-//!
-//! | file | what it holds |
-//! |---|---|
-//! | `method/` | what is trained: our method and those that it is compared with |
-//! | `settings.rs` | the recipe in the model's types |
-//! | `schedule.rs` | our method's phases, ramp and learning rates by step |
-//! | `batch.rs` | the samples of a step, on the host, and their equal parts |
-//! | `posed.rs` | the objective of a part, its terms and its gradients |
-//! | `motion.rs` | what a step asks of `V`: trajectories, matching, priors |
-//! | `step.rs` | the objective of a step with `f(x, t)` in one network, on the device |
-//! | `flow_step.rs` | the same with two end fields that the flow carries |
-//! | `optimiser.rs` | Adam with a limited gradient |
-//! | `checkpoint.rs` | whole checkpoints or none |
-//! | `event.rs` | what the loop reports |
-//! | `flop.rs` | what a step costs |
-//! | `memory.rs` | the process's peak memory |
-//!
-//! The learner prints nothing and knows no terminal: it emits [`Event`]s, which [`crate::report`] renders.
-
-pub mod batch;
-pub mod checkpoint;
-pub mod event;
-pub mod flop;
-pub mod flow_step;
-pub mod memory;
-pub mod method;
-pub mod motion;
-mod optimiser;
-pub mod posed;
-pub mod schedule;
-pub mod settings;
-pub mod step;
+//! The loop that trains a method, from the first step or from a checkpoint, on whichever backend.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use burn::tensor::backend::Backend;
-use isomorph_model::TrainBackend;
+use isomorph_training::data::TrainingData;
+use isomorph_training::engine::{Engine, NotHere, Trainer};
+use isomorph_training::method;
+use isomorph_training::records::BURN_VERSION;
 
+use super::checkpoint::{self, Checkpoint, CheckpointError, State};
+use crate::event::{Event, StepReport, TermReport};
+use crate::memory;
 use crate::recipe::{Change, MethodName, Recipe};
-use crate::shape::Pair;
-use crate::workers::Workers;
-use batch::Part;
-use checkpoint::{Checkpoint, CheckpointError, State};
-use event::{Event, StepReport, TermReport};
-use method::{Method, TrainingData};
-use posed::Slopes;
+use crate::shape::{Keyframes, Normalisation};
 
 /// Why training stopped before its last step.
 #[derive(Debug, thiserror::Error)]
@@ -69,17 +36,30 @@ pub enum LearnerError {
     #[error("{0}")]
     Missing(String),
     /// The networks of the recipe are not those of the checkpoint.
-    #[error("{0}")]
-    OtherNetworks(String),
+    #[error(
+        "{path}: {} is {} in the checkpoint and {} in the recipe: {why}; restore the value, or start a new run",
+        change.key, change.before, change.after
+    )]
+    OtherNetworks {
+        /// The checkpoint.
+        path: PathBuf,
+        /// What differs.
+        change: Change,
+        /// Why it may not.
+        why: String,
+    },
     /// The shapes are not those of the checkpoint.
     #[error(
-        "{0}: the shapes are not those that this run was started with (their joint size or place differs); restore the files, or start a new run with `isomorph train`"
+        "{0}: the shapes are not those that this run was started with (their joint size or place differs); restore the files, or start a new run"
     )]
     OtherShapes(PathBuf),
+    /// The method does not run on the backend.
+    #[error(transparent)]
+    NotHere(#[from] NotHere),
     /// A checkpoint could not be written or read.
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
-    /// An event could not be recorded.
+    /// An event could not be recorded, or networks not be encoded.
     #[error("{0}")]
     Record(#[from] std::io::Error),
 }
@@ -94,30 +74,39 @@ pub enum Outcome {
 }
 
 /// A method, its data, and where training stands.
-pub struct Learner<B: TrainBackend> {
+pub struct Learner {
     recipe: Recipe,
     data: TrainingData,
-    device: B::Device,
-    method: Box<dyn Method<B>>,
+    normalisation: Normalisation,
+    trainer: Box<dyn Trainer>,
+    backend: String,
+    device: String,
     step: usize,
     seconds: f64,
 }
 
-impl<B: TrainBackend> Learner<B> {
+impl Learner {
     /// A learner before its first step.
     ///
     /// # Errors
     /// [`LearnerError::Missing`] if the recipe's method needs normals or correspondences and there are
-    /// none.
-    pub fn new(recipe: Recipe, pair: Pair, device: B::Device) -> Result<Self, LearnerError> {
-        method::check(&recipe, &pair).map_err(LearnerError::Missing)?;
+    /// none; [`LearnerError::NotHere`].
+    pub fn new(
+        recipe: Recipe,
+        keyframes: &Keyframes,
+        engine: &dyn Engine,
+    ) -> Result<Self, LearnerError> {
+        let data = keyframes.training_data();
+        method::check(&recipe, &data).map_err(LearnerError::Missing)?;
         Ok(Self {
-            method: method::build(&recipe, &pair.bounds, &device),
-            data: TrainingData::new(pair),
+            trainer: engine.method(&recipe, &data.bounds)?,
+            normalisation: keyframes.normalisation,
+            backend: engine.backend(),
+            device: engine.device(),
+            data,
             step: 0,
             seconds: 0.0,
             recipe,
-            device,
         })
     }
 
@@ -128,26 +117,22 @@ impl<B: TrainBackend> Learner<B> {
     /// [`LearnerError::OtherShapes`]; [`LearnerError::Checkpoint`] if the checkpoint is damaged.
     pub fn resume(
         recipe: Recipe,
-        pair: Pair,
-        device: B::Device,
+        keyframes: &Keyframes,
+        engine: &dyn Engine,
         checkpoint: &Checkpoint,
     ) -> Result<Self, LearnerError> {
-        fits(checkpoint, &recipe, &pair)?;
-        let mut learner = Self::new(recipe, pair, device)?;
-        learner.method.restore(checkpoint)?;
+        fits(checkpoint, &recipe, keyframes)?;
+        let mut learner = Self::new(recipe, keyframes, engine)?;
+        let restored = learner.trainer.restore(&checkpoint.records()?);
+        restored.map_err(|error| checkpoint.damaged(error))?;
         learner.step = checkpoint.state.step;
         learner.seconds = checkpoint.state.seconds;
         Ok(learner)
     }
 
     /// What is trained, as it stands.
-    pub fn method(&self) -> &dyn Method<B> {
-        &*self.method
-    }
-
-    /// Steps done.
-    pub fn step_count(&self) -> usize {
-        self.step
+    pub fn trainer(&self) -> &dyn Trainer {
+        &*self.trainer
     }
 
     /// Seconds of training so far, over all resumes.
@@ -172,7 +157,7 @@ impl<B: TrainBackend> Learner<B> {
         let mut saved = self.step > 0;
         let mut phase = None;
         while self.step < steps {
-            let entered = self.method.phase(self.step);
+            let entered = self.trainer.phase(self.step);
             if phase != Some(entered) {
                 phase = Some(entered);
                 emit(Event::PhaseEntered {
@@ -212,16 +197,9 @@ impl<B: TrainBackend> Learner<B> {
 
     /// One step of the optimisers; the unweighted terms with their weights if `read` asks for them.
     pub fn advance(&mut self, read: bool) -> Option<Vec<TermReport>> {
-        let parts = self.method.parts();
-        let (method, data, step) = (&*self.method, &self.data, self.step);
-        let done = Workers::shared().map(parts, |index| {
-            let part = Part { index, of: parts };
-            method.objective(data, step, part).solve(parts, read)
-        });
-        let (reports, gradients): (Vec<_>, Vec<_>) = done.into_iter().unzip();
-        self.method.descend(step, &mut Slopes::new(gradients));
+        let report = self.trainer.advance(&self.data, self.step, read);
         self.step += 1;
-        read.then(|| posed::mean_of(&reports))
+        report
     }
 
     fn is_logged(&self, done: usize) -> bool {
@@ -242,11 +220,11 @@ impl<B: TrainBackend> Learner<B> {
     ) -> Result<(), LearnerError> {
         let wrong = terms.iter().find(|term| !term.raw.is_finite()).cloned();
         let made = self.step - 1;
-        let rates = self.method.rates(made);
+        let rates = self.trainer.rates(made);
         let report = StepReport {
             step: self.step,
             steps: self.recipe.training.steps,
-            phase: self.method.phase(made),
+            phase: self.trainer.phase(made),
             seconds: self.seconds,
             total: terms.iter().map(|term| term.weighted).sum(),
             terms,
@@ -274,7 +252,7 @@ impl<B: TrainBackend> Learner<B> {
         checkpoints: &Path,
         emit: &mut dyn FnMut(Event) -> std::io::Result<()>,
     ) -> Result<(), LearnerError> {
-        let files = self.method.records().map_err(LearnerError::Record)?;
+        let files = self.trainer.records()?;
         let keep = self.recipe.checkpoint.keep;
         let path = checkpoint::save(checkpoints, self.state(), files, keep)?;
         emit(Event::Checkpoint {
@@ -285,38 +263,30 @@ impl<B: TrainBackend> Learner<B> {
     }
 
     fn state(&self) -> State {
-        let recipe = &self.recipe;
-        let networks = format!(
-            "{:?} {:?} {:?}",
-            recipe.method, recipe.implicit, recipe.velocity
-        );
         State {
             format_version: checkpoint::FORMAT_VERSION,
             isomorph_version: env!("CARGO_PKG_VERSION").to_owned(),
-            burn_version: checkpoint::BURN_VERSION.to_owned(),
+            burn_version: BURN_VERSION.to_owned(),
             step: self.step,
             seconds: self.seconds,
-            seed: recipe.training.seed,
-            backend: B::InnerBackend::name(&self.device),
-            network_digest: format!("{:08x}", crc32fast::hash(networks.as_bytes())),
-            normalisation: self.data.pair.normalisation,
-            bounds: self.data.pair.bounds,
-            recipe: recipe.to_toml(),
+            seed: self.recipe.training.seed,
+            backend: self.backend.clone(),
+            normalisation: self.normalisation,
+            bounds: self.data.bounds,
+            recipe: self.recipe.to_toml(),
             files: Default::default(),
         }
     }
 
     fn started(&self) -> Event {
-        let pair = &self.data.pair;
         Event::Started {
-            backend: B::InnerBackend::name(&self.device),
-            device: format!("{:?}", self.device),
+            backend: self.backend.clone(),
+            device: self.device.clone(),
             steps: self.recipe.training.steps,
             first_step: self.step,
-            networks: self.method.networks(),
-            source_points: pair.source.points.len(),
-            target_points: pair.target.points.len(),
-            correspondences: pair.correspondences.len(),
+            networks: self.trainer.networks(),
+            points: self.data.keys.iter().map(|key| key.points.len()).collect(),
+            correspondences: self.data.pair_count(),
         }
     }
 }
@@ -326,43 +296,41 @@ impl<B: TrainBackend> Learner<B> {
 /// # Errors
 /// [`LearnerError::OtherNetworks`], [`LearnerError::OtherShapes`], and [`LearnerError::Checkpoint`] if the
 /// checkpoint's recipe no longer parses.
-pub fn fits(checkpoint: &Checkpoint, recipe: &Recipe, pair: &Pair) -> Result<(), LearnerError> {
-    if let Some(change) = fixed_change(&checkpoint.recipe()?, recipe) {
-        let why = if change.is_of_a_network() {
-            "a trained network cannot change its shape".to_owned()
-        } else {
-            format!(
-                "{} shares its steps out, so their number is fixed",
-                recipe.method.name
-            )
-        };
-        return Err(LearnerError::OtherNetworks(format!(
-            "{}: {} is {} in the checkpoint and {} in the recipe: {why}; restore the value, or \
-             start a new run with `isomorph train`",
-            checkpoint.path.display(),
-            change.key,
-            change.before,
-            change.after
-        )));
+pub fn fits(
+    checkpoint: &Checkpoint,
+    recipe: &Recipe,
+    keyframes: &Keyframes,
+) -> Result<(), LearnerError> {
+    if let Some((change, why)) = fixed_change(&checkpoint.recipe()?, recipe) {
+        let path = checkpoint.path.clone();
+        return Err(LearnerError::OtherNetworks { path, change, why });
     }
-    if checkpoint.state.normalisation != pair.normalisation {
+    if checkpoint.state.normalisation != keyframes.normalisation {
         return Err(LearnerError::OtherShapes(checkpoint.path.clone()));
     }
     Ok(())
 }
 
-/// The first change that a run cannot take once it has begun: one of its networks, or of the number of
-/// steps where the method shares them out among what it trains one after the other.
-fn fixed_change(before: &Recipe, after: &Recipe) -> Option<Change> {
+/// The first change that a run cannot take once it has begun, and why: one of its networks, or of the
+/// number of steps where the method shares them out among what it trains one after the other.
+fn fixed_change(before: &Recipe, after: &Recipe) -> Option<(Change, String)> {
+    let name = before.method.name;
     let shares_steps = matches!(
-        before.method.name,
+        name,
         MethodName::Nise | MethodName::NiseVelocity | MethodName::Nfgp
     );
     let is_fixed = |change: &Change| {
         change.is_of_a_network() || (shares_steps && change.key == "training.steps")
     };
-    before.changes(after).into_iter().find(is_fixed)
+    let change = before.changes(after).into_iter().find(is_fixed)?;
+    let why = if change.is_of_a_network() {
+        "a trained network cannot change its shape".to_owned()
+    } else {
+        format!("{name} shares its steps out, so their number is fixed")
+    };
+    Some((change, why))
 }
 
 #[cfg(test)]
+#[path = "learner_tests.rs"]
 mod tests;

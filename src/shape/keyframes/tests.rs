@@ -1,4 +1,4 @@
-//! Tests of the preparation of a pair.
+//! Tests of the preparation of key frames.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -31,37 +31,62 @@ fn write_cloud(path: &Path, points: &[[f64; 3]], normals: Option<&[[f64; 3]]>) {
     std::fs::write(path, text).expect("written");
 }
 
+/// Two shapes as files, and what to make of them.
+struct Files {
+    folder: tempfile::TempDir,
+    source: PathBuf,
+    target: PathBuf,
+    options: DataOptions,
+}
+
+impl Files {
+    fn prepare(&self) -> Result<Keyframes, ShapeError> {
+        let shapes = [&self.source, &self.target].map(|path| crate::shape::read(path));
+        let [source, target] = shapes.map(|shape| shape.expect("a shape"));
+        prepare(&[source, target], &self.options)
+    }
+
+    fn prepared(&self) -> Keyframes {
+        self.prepare().expect("prepared")
+    }
+}
+
 /// Two tetrahedra in a folder of their own, the second twice as large, and options for them.
-fn tetrahedra() -> (tempfile::TempDir, DataOptions) {
+fn tetrahedra() -> Files {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let options = DataOptions {
-        source: folder.path().join("a.obj"),
-        target: folder.path().join("b.obj"),
-        correspondences: CorrespondenceSource::SameVertices,
+        times: vec![0.0, 1.0],
+        between: vec![CorrespondenceSource::SameVertices],
         points: 1000,
         correspondence_fraction: 0.05,
         normals: NormalSource::Auto,
         seed: 9,
     };
-    write_tetrahedron(&options.source, 1.0, false, 4);
-    write_tetrahedron(&options.target, 2.0, false, 4);
-    (folder, options)
+    let (source, target) = (folder.path().join("a.obj"), folder.path().join("b.obj"));
+    write_tetrahedron(&source, 1.0, false, 4);
+    write_tetrahedron(&target, 2.0, false, 4);
+    Files {
+        folder,
+        source,
+        target,
+        options,
+    }
 }
 
 /// The point in the user's coordinates relative to the corner of the tetrahedron.
-fn relative(pair: &Pair, point: [f32; 3]) -> [f64; 3] {
+fn relative(pair: &Keyframes, point: [f32; 3]) -> [f64; 3] {
     let [x, y, z] = pair.normalisation.invert(point);
     [x - 5e5, y, z]
 }
 
 #[test]
 fn shared_triangles_give_surface_pairs_at_equal_barycentric_coordinates() {
-    let (_folder, options) = tetrahedra();
-    let pair = prepare(&options).expect("prepared");
-    assert_eq!(pair.source.points.len(), 1000);
-    assert_eq!(pair.correspondences.len(), 50);
+    let files = tetrahedra();
+    let pair = files.prepared();
+    assert_eq!(pair.keys[0].cloud.points.len(), 1000);
+    assert_eq!(pair.between[0].len(), 50);
     assert_eq!(pair.notes, Vec::<String>::new());
-    for &(from, to) in &pair.correspondences {
+    for &(from, to) in &pair.between[0] {
         let (from, to) = (relative(&pair, from), relative(&pair, to));
         for axis in 0..3 {
             // Float32 in a frame two units wide.
@@ -73,7 +98,7 @@ fn shared_triangles_give_surface_pairs_at_equal_barycentric_coordinates() {
     }
     // Not merely the vertices: there are only four.
     assert!(
-        pair.correspondences
+        pair.between[0]
             .iter()
             .any(|&(from, _)| relative(&pair, from)[0] % 1.0 > 0.01)
     );
@@ -81,56 +106,55 @@ fn shared_triangles_give_surface_pairs_at_equal_barycentric_coordinates() {
 
 #[test]
 fn the_same_options_give_the_same_pair_and_another_seed_another() {
-    let (_folder, mut options) = tetrahedra();
-    let first = prepare(&options).expect("prepared");
-    assert_eq!(prepare(&options).expect("prepared"), first);
-    options.seed = 10;
-    let second = prepare(&options).expect("prepared");
-    assert_ne!(second.source.points, first.source.points);
-    assert_ne!(first.source.points, first.target.points);
+    let mut files = tetrahedra();
+    let first = files.prepared();
+    assert_eq!(files.prepared(), first);
+    files.options.seed = 10;
+    let second = files.prepared();
+    assert_ne!(second.keys[0].cloud.points, first.keys[0].cloud.points);
+    assert_ne!(first.keys[0].cloud.points, first.keys[1].cloud.points);
     assert_eq!(second.normalisation, first.normalisation);
 }
 
 #[test]
 fn pairs_from_a_file_are_used_up_to_the_fraction() {
-    let (folder, mut options) = tetrahedra();
-    let path = folder.path().join("pairs.csv");
+    let mut files = tetrahedra();
+    let path = files.folder.path().join("pairs.csv");
     std::fs::write(&path, "0,0\n1,3\n2,2\n").expect("written");
-    options.correspondences = CorrespondenceSource::File(path);
-    let pair = prepare(&options).expect("prepared");
+    files.options.between = vec![CorrespondenceSource::File(path)];
+    let pair = files.prepared();
     let places = |(from, to)| (relative(&pair, from), relative(&pair, to));
     let round = |x: [f64; 3]| x.map(|coordinate| (coordinate * 1e5).round() / 1e5);
-    let (from, to) = places(pair.correspondences[1]);
+    let (from, to) = places(pair.between[0][1]);
     assert_eq!((round(from), round(to)), ([1.0, 0.0, 0.0], [0.0, 0.0, 2.0]));
-    assert_eq!(pair.correspondences.len(), 3);
-    options.correspondence_fraction = 0.002;
+    assert_eq!(pair.between[0].len(), 3);
+    files.options.correspondence_fraction = 0.002;
     assert_eq!(
-        prepare(&options).expect("prepared").correspondences.len(),
+        files.prepared().between[0].len(),
         2
     );
     for fraction in [0.0, -1.0, f64::NAN] {
-        options.correspondence_fraction = fraction;
-        let text = prepare(&options).expect_err("none left").to_string();
+        files.options.correspondence_fraction = fraction;
+        let text = files.prepare().expect_err("none left").to_string();
         assert!(
             text.starts_with("data.correspondence-fraction = "),
             "{text}"
         );
     }
-    options.correspondences = CorrespondenceSource::None;
+    files.options.between = vec![CorrespondenceSource::None];
     assert!(
-        prepare(&options)
-            .expect("prepared")
-            .correspondences
+        files.prepared()
+            .between[0]
             .is_empty()
     );
 }
 
 #[test]
 fn a_mesh_wound_inwards_has_its_normals_flipped_unless_told_not_to() {
-    let (_folder, mut options) = tetrahedra();
-    let outward = prepare(&options).expect("prepared").source.normals;
-    write_tetrahedron(&options.source, 1.0, true, 4);
-    let pair = prepare(&options).expect("prepared");
+    let mut files = tetrahedra();
+    let outward = files.prepared().keys[0].cloud.normals;
+    write_tetrahedron(&files.source, 1.0, true, 4);
+    let pair = files.prepared();
     assert_eq!(pair.notes.len(), 1);
     assert!(
         pair.notes[0].contains("a.obj: triangles are wound inwards"),
@@ -144,23 +168,23 @@ fn a_mesh_wound_inwards_has_its_normals_flipped_unless_told_not_to() {
             .filter(|normal| normal.iter().any(|&x| x > 0.01) != (normal[0] > 0.5))
             .count()
     };
-    assert_eq!([inside(&outward), inside(&pair.source.normals)], [0, 0]);
-    options.normals = NormalSource::Given;
-    let given = prepare(&options).expect("prepared");
-    assert!(inside(&given.source.normals) > 0, "as wound");
-    options.normals = NormalSource::None;
-    assert_eq!(prepare(&options).expect("prepared").source.normals, None);
+    assert_eq!([inside(&outward), inside(&pair.keys[0].cloud.normals)], [0, 0]);
+    files.options.normals = NormalSource::Given;
+    let given = files.prepared();
+    assert!(inside(&given.keys[0].cloud.normals) > 0, "as wound");
+    files.options.normals = NormalSource::None;
+    assert_eq!(files.prepared().keys[0].cloud.normals, None);
 }
 
 #[test]
 fn an_open_mesh_and_one_wound_both_ways_are_noted() {
-    let (_folder, options) = tetrahedra();
-    write_tetrahedron(&options.source, 1.0, false, 3);
-    let text = std::fs::read_to_string(&options.target).expect("read");
+    let files = tetrahedra();
+    write_tetrahedron(&files.source, 1.0, false, 3);
+    let text = std::fs::read_to_string(&files.target).expect("read");
     let turned = text.replacen("f 1 3 2", "f 1 2 3", 1);
     assert_ne!(text, turned);
-    std::fs::write(&options.target, turned).expect("written");
-    let notes = prepare(&options).expect("prepared").notes;
+    std::fs::write(&files.target, turned).expect("written");
+    let notes = files.prepared().notes;
     assert!(
         notes[0].contains("a.obj: the mesh is not closed (3 open edges"),
         "{notes:?}"
@@ -173,15 +197,15 @@ fn an_open_mesh_and_one_wound_both_ways_are_noted() {
 
 #[test]
 fn a_cloud_is_used_as_it_is_with_its_own_normals_or_estimated_ones() {
-    let (_folder, mut options) = tetrahedra();
+    let mut files = tetrahedra();
     let points = sphere_cloud(500, 2.0, 31);
     let inward: Vec<_> = points.iter().map(|point| point.map(|x| -x)).collect();
-    write_cloud(&options.source, &points, Some(&inward));
-    write_cloud(&options.target, &points, None);
-    let pair = prepare(&options).expect("prepared");
-    assert_eq!(pair.source.points.len(), 500);
+    write_cloud(&files.source, &points, Some(&inward));
+    write_cloud(&files.target, &points, None);
+    let pair = files.prepared();
+    assert_eq!(pair.keys[0].cloud.points.len(), 500);
     // 5 % of the 500 points there are, not of the 1,000 asked of meshes.
-    assert_eq!(pair.correspondences.len(), 25);
+    assert_eq!(pair.between[0].len(), 25);
     assert!(
         pair.notes[0].contains("a.obj: the file's normals point inwards on the whole"),
         "{:?}",
@@ -193,9 +217,9 @@ fn a_cloud_is_used_as_it_is_with_its_own_normals_or_estimated_ones() {
         pair.notes
     );
     assert_eq!(pair.notes.len(), 2);
-    write_cloud(&options.source, &points, Some(&points));
-    assert_eq!(prepare(&options).expect("prepared").notes.len(), 1);
-    write_cloud(&options.source, &points, Some(&inward));
+    write_cloud(&files.source, &points, Some(&points));
+    assert_eq!(files.prepared().notes.len(), 1);
+    write_cloud(&files.source, &points, Some(&inward));
     let outward = |cloud: &Cloud| {
         let normals = cloud.normals.as_ref().expect("normals");
         let pairs = cloud.points.iter().zip(normals);
@@ -203,28 +227,52 @@ fn a_cloud_is_used_as_it_is_with_its_own_normals_or_estimated_ones() {
             .filter(|(p, n)| p.iter().zip(*n).map(|(p, n)| p * n).sum::<f32>() > 0.0)
             .count()
     };
-    assert_eq!([outward(&pair.source), outward(&pair.target)], [0, 500]);
-    options.normals = NormalSource::Given;
-    let text = prepare(&options).expect_err("no normals").to_string();
+    assert_eq!([outward(&pair.keys[0].cloud), outward(&pair.keys[1].cloud)], [0, 500]);
+    files.options.normals = NormalSource::Given;
+    let text = files.prepare().expect_err("no normals").to_string();
     assert!(
         text.contains("b.obj: the file has no normals; set data.normals"),
         "{text}"
     );
-    options.normals = NormalSource::Estimate;
-    let pair = prepare(&options).expect("prepared");
-    assert_eq!([outward(&pair.source), outward(&pair.target)], [500, 500]);
+    files.options.normals = NormalSource::Estimate;
+    let pair = files.prepared();
+    assert_eq!([outward(&pair.keys[0].cloud), outward(&pair.keys[1].cloud)], [500, 500]);
 }
 
 #[test]
 fn the_bounds_hold_every_point_of_both() {
-    let (_folder, mut options) = tetrahedra();
-    let pair = prepare(&options).expect("prepared");
-    for point in pair.source.points.iter().chain(&pair.target.points) {
+    let mut files = tetrahedra();
+    let pair = files.prepared();
+    for point in pair.keys[0].cloud.points.iter().chain(&pair.keys[1].cloud.points) {
         assert_eq!(pair.bounds.union(&Bounds::of(&[*point])), pair.bounds);
     }
     // And no more: half of a box this size would not.
-    assert_ne!(pair.bounds, Bounds::of(&pair.source.points));
-    options.points = 63;
-    let text = prepare(&options).expect_err("too few").to_string();
+    assert_ne!(pair.bounds, Bounds::of(&pair.keys[0].cloud.points));
+    files.options.points = 63;
+    let text = files.prepare().expect_err("too few").to_string();
     assert_eq!(text, "data.points = 63: must be 64 or more");
+}
+
+#[test]
+fn three_key_frames_have_pairs_between_each_two_and_samples_of_their_own() {
+    let files = tetrahedra();
+    let shapes = [&files.source, &files.target, &files.source].map(|path| crate::shape::read(path));
+    let shapes = shapes.map(|shape| shape.expect("a shape"));
+    let options = DataOptions {
+        times: vec![0.0, 0.25, 1.0],
+        between: vec![
+            CorrespondenceSource::SameVertices,
+            CorrespondenceSource::None,
+        ],
+        ..files.options.clone()
+    };
+    let three = prepare(&shapes, &options).expect("prepared");
+    assert_eq!([three.between[0].len(), three.between[1].len()], [50, 0]);
+    assert_eq!((three.keys.len(), three.pair_count()), (3, 50));
+    assert_eq!(three.keys[1].time, 0.25);
+    let [first, .., last] = &three.keys[..] else {
+        panic!("three key frames")
+    };
+    assert_ne!(first.cloud.points, last.cloud.points, "one shape, drawn anew");
+    assert_eq!(three.training_data().keys.len(), 3);
 }

@@ -1,57 +1,18 @@
-//! What the learner reports while it works.
+//! What is reported while work goes on.
 //!
-//! The learner computes and emits [`Event`]s; it knows no terminal and no file of theirs.
-//! [`crate::report`] renders them. Steps are counted from 1 as they are done: `step` is how many are.
+//! The library computes and emits [`Event`]s; front ends show them. Steps are counted from 1 as they are
+//! done: `step` is how many are.
 
 use std::fmt;
 use std::path::PathBuf;
+use std::time::Duration;
 
-use serde::{Deserialize, Serialize};
+pub use isomorph_training::report::{Phase, TermReport};
 
-/// A stretch of training in which the same networks and terms take part.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Phase {
-    /// Only the Velocity-Net trains.
-    WarmUp,
-    /// Both train; the weight of the coupled terms of f grows.
-    Ramp,
-    /// Both train with full weights.
-    Joint,
-    /// The Velocity-Net is done; only the Implicit-Net trains.
-    ImplicitOnly,
-    /// A method it is compared with: what is fitted at t = 0 and t = 1.
-    Ends,
-    /// A method it is compared with: what lies between, the ends being done.
-    Between,
-    /// A method it is compared with: what moves points.
-    Motion,
-}
+#[path = "event_line.rs"]
+mod line;
 
-impl fmt::Display for Phase {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.pad(match self {
-            Self::WarmUp => "velocity warm-up",
-            Self::Ramp => "ramp",
-            Self::Joint => "joint",
-            Self::ImplicitOnly => "implicit only",
-            Self::Ends => "ends",
-            Self::Between => "between",
-            Self::Motion => "motion",
-        })
-    }
-}
-
-/// One term of the objective at one step.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct TermReport {
-    /// Its name, as in the recipe's `[loss]`.
-    pub name: &'static str,
-    /// Its value before the weight.
-    pub raw: f64,
-    /// What it adds to the total.
-    pub weighted: f64,
-}
+pub use line::duration;
 
 /// The objective and the rates at one logged step.
 #[derive(Clone, Debug, PartialEq)]
@@ -72,11 +33,12 @@ pub struct StepReport {
     pub learning_rate: f64,
     /// Learning rate of the Velocity-Net.
     pub velocity_learning_rate: f64,
-    /// See [`peak_memory_bytes`](super::memory::peak_memory_bytes).
+    /// Peak resident memory of this process, where the system says.
     pub peak_memory_bytes: Option<u64>,
 }
 
-/// Something that happened during training or extraction.
+/// Something that happened during training, extraction or measuring.
+#[non_exhaustive]
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {
     /// Training is about to make its first step in this process.
@@ -91,16 +53,16 @@ pub enum Event {
         first_step: usize,
         /// The networks and how many weights each has.
         networks: Vec<(&'static str, usize)>,
-        /// Points sampled on the source.
-        source_points: usize,
-        /// Points sampled on the target.
-        target_points: usize,
+        /// Points sampled on each key frame.
+        points: Vec<usize>,
         /// Known correspondences between them.
         correspondences: usize,
     },
-    /// Something that the user should know, in a sentence.
+    /// Something that a user should read, in a sentence.
     Note(String),
-    /// Pairs of the two shapes were found before training.
+    /// Pairs of the shapes are being found, which takes about half a minute.
+    Matching,
+    /// Pairs of two shapes were found before training.
     Matched {
         /// How many.
         pairs: usize,
@@ -158,6 +120,13 @@ pub enum Event {
         /// Whether the box that was searched cuts it off.
         touches_box: bool,
     },
+    /// Frames are being measured against the ground truth.
+    Measuring {
+        /// Frames done; none while the best times are found.
+        done: usize,
+        /// Frames in all.
+        total: usize,
+    },
     /// Training stopped on request, and a checkpoint holds all of it.
     Interrupted {
         /// Steps done.
@@ -172,15 +141,25 @@ pub enum Event {
     },
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+impl Event {
+    /// The event as one line of text without its end, `None` for what needs no line. `left` is how long
+    /// the remaining steps may take.
+    pub fn line(&self, left: Option<Duration>) -> Option<String> {
+        line::line(self, left)
+    }
+}
 
-    #[test]
-    fn phases_are_padded_like_text() {
-        assert_eq!(
-            format!("[{:>6}|{:<14}]", Phase::Ramp, Phase::ImplicitOnly),
-            "[  ramp|implicit only ]"
-        );
+/// The event's line, or nothing.
+impl fmt::Display for Event {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(&self.line(None).unwrap_or_default())
+    }
+}
+
+impl StepReport {
+    /// The total of the step and its largest terms: `total 1.23 (matching 0.810, 2 more 0.420)`. Values
+    /// are weighted, so that they add up to the total.
+    pub fn objective(&self) -> String {
+        line::objective(self)
     }
 }

@@ -1,0 +1,106 @@
+//! One method on one pair of a comparison: trained, or its training gone on with, and measured.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use isomorph_training::engine::Engine;
+
+use super::checkpoint::{Checkpoint, CheckpointError};
+use super::folder::RunFolder;
+use super::learned::{self, Frame};
+use super::learner::{Learner, Outcome};
+use super::log::RunLog;
+use super::measure::{Ruler, measure};
+use super::prepare::Prepared;
+use crate::compare::Network;
+use crate::error::{Error, Result};
+use crate::evaluate::Evaluation;
+use crate::event::Event;
+use crate::recipe::Recipe;
+
+/// The pairs that a run made with this recipe has found, if it is there to be gone on with.
+pub fn stored_pairs(path: &Path, recipe: &Recipe) -> Option<PathBuf> {
+    let run = RunFolder::open(path).ok()?;
+    is_of(&run, recipe).then(|| run.pairs())
+}
+
+fn is_of(run: &RunFolder, recipe: &Recipe) -> bool {
+    Recipe::read(&run.recipe(), &[]).is_ok_and(|before| before == *recipe)
+}
+
+/// The run in a folder if it was made with this recipe, with its newest checkpoint; else a new one.
+fn open_or_create(path: &Path, recipe: &Recipe) -> Result<(RunFolder, Option<Checkpoint>)> {
+    if let Ok(run) = RunFolder::open(path)
+        && is_of(&run, recipe)
+    {
+        match Checkpoint::newest(&run.checkpoints()) {
+            Ok(checkpoint) => return Ok((run, Some(checkpoint))),
+            Err(CheckpointError::None(_)) => return Ok((run, None)),
+            // Damaged: the run starts again.
+            Err(_) => {}
+        }
+    }
+    Ok((RunFolder::create(path, &recipe.to_toml(), true)?, None))
+}
+
+/// What came out of one method on one pair.
+pub struct Made {
+    pub networks: Vec<Network>,
+    pub training_seconds: f64,
+    pub evaluation_seconds: f64,
+    pub evaluation: Evaluation,
+}
+
+/// Trains a method, or goes on with its training, and measures it.
+///
+/// # Errors
+/// Of kind [`Interruption`](crate::ErrorKind::Interruption) if it was stopped; else what keeps the method
+/// from being trained or measured.
+pub fn make(
+    path: &Path,
+    recipe: &Recipe,
+    prepared: &Prepared,
+    engine: &dyn Engine,
+    ruler: &Ruler,
+    on_event: &mut dyn FnMut(&Event),
+) -> Result<Made> {
+    let (run, checkpoint) = open_or_create(path, recipe)?;
+    let step = checkpoint.as_ref().map(|found| found.state.step);
+    let mut log = RunLog::open(run.path(), step)?;
+    let keyframes = &prepared.keyframes;
+    if let Some(matched) = prepared.keep(&run)? {
+        on_event(&matched);
+        log.record(&matched)?;
+    }
+    let mut learner = match &checkpoint {
+        None => Learner::new(recipe.clone(), keyframes, engine)?,
+        Some(checkpoint) => Learner::resume(recipe.clone(), keyframes, engine, checkpoint)?,
+    };
+    let mut emit = |event: Event| {
+        on_event(&event);
+        log.record(&event)
+    };
+    let outcome = learner.run(&run.checkpoints(), ruler.stop.flag(), &mut emit)?;
+    if outcome == Outcome::Interrupted {
+        return Err(Error::interruption("stopped while training"));
+    }
+    let clock = Instant::now();
+    let frame = Frame {
+        normalisation: keyframes.normalisation,
+        bounds: keyframes.bounds,
+    };
+    let learned = learned::learned(learner.trainer().deformation(), recipe, frame)?;
+    let evaluation = measure(&learned, ruler, on_event)?;
+    let networks = learner.trainer().networks().into_iter();
+    Ok(Made {
+        networks: networks
+            .map(|(name, parameters)| Network {
+                name: name.to_owned(),
+                parameters,
+            })
+            .collect(),
+        training_seconds: learner.seconds(),
+        evaluation_seconds: clock.elapsed().as_secs_f64(),
+        evaluation,
+    })
+}

@@ -1,0 +1,156 @@
+//! The surfaces of a run as files: at any times, in any resolution, with a picture of them.
+
+use std::io;
+use std::path::PathBuf;
+
+use super::log::RunLog;
+use super::stop::StopFlag;
+use super::trained::{Trained, check_time};
+use crate::error::{Error, Result};
+use crate::event::Event;
+use crate::recipe::Recipe;
+use crate::report::picture;
+use crate::surface::frames::{Frame, FrameOptions, write_frames};
+use crate::surface::write::SurfaceFormat;
+
+/// What to write.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ExtractOptions {
+    /// The times, 0 (the first shape) to 1 (the last).
+    pub times: Vec<f64>,
+    /// Cells of the grid along the longest side of the box.
+    pub resolution: usize,
+    /// The kind of the files.
+    pub format: SurfaceFormat,
+    /// Whether the source's own vertices are carried along as well.
+    pub carry: bool,
+    /// Pieces with less than this share of a surface's area are left out.
+    pub smallest_component: f64,
+    /// Where the files go; the run's own `meshes` folder without it.
+    pub folder: Option<PathBuf>,
+}
+
+impl ExtractOptions {
+    /// What the recipe asks for at the end of training.
+    pub fn of(recipe: &Recipe) -> Self {
+        Self {
+            times: even_times(recipe.result.frames),
+            resolution: recipe.result.resolution,
+            format: SurfaceFormat::Ply,
+            carry: false,
+            smallest_component: recipe.result.smallest_component,
+            folder: None,
+        }
+    }
+}
+
+/// Evenly spaced times from 0 to 1.
+pub fn even_times(frames: usize) -> Vec<f64> {
+    match frames {
+        1 => vec![0.0],
+        _ => (0..frames)
+            .map(|k| k as f64 / (frames - 1) as f64)
+            .collect(),
+    }
+}
+
+impl Trained {
+    /// Writes surfaces, `frames.json` that lists them, and `preview.png` that shows them; returns the path
+    /// of `frames.json`.
+    ///
+    /// # Errors
+    /// Of kind [`Interruption`](crate::ErrorKind::Interruption) if the stop flag was set; else what keeps a
+    /// surface from being found or written.
+    pub fn extract(
+        &self,
+        options: &ExtractOptions,
+        stop: &StopFlag,
+        mut on_event: impl FnMut(&Event),
+    ) -> Result<PathBuf> {
+        let mut log = RunLog::open(self.folder().path(), Some(usize::MAX))?;
+        self.extract_into(options, stop, &mut log, &mut on_event)
+    }
+
+    pub(super) fn extract_into(
+        &self,
+        options: &ExtractOptions,
+        stop: &StopFlag,
+        log: &mut RunLog,
+        on_event: &mut dyn FnMut(&Event),
+    ) -> Result<PathBuf> {
+        options.times.iter().try_for_each(|time| check_time(*time))?;
+        if !(0.0..=1.0).contains(&options.smallest_component) {
+            return Err(Error::usage(format!(
+                "smallest component {}: must be 0 to 1 (0 keeps every piece)",
+                options.smallest_component
+            )));
+        }
+        let folder = options.folder.clone();
+        let frame_options = FrameOptions {
+            times: options.times.clone(),
+            resolution: options.resolution,
+            format: options.format,
+            carry: options.carry.then(|| self.recipe().data.source.clone()),
+            smallest_component: options.smallest_component,
+            folder: folder.unwrap_or_else(|| self.folder().meshes()),
+        };
+        let mut emit = |event: Event| {
+            on_event(&event);
+            log.record(&event)
+        };
+        emit(Event::Extracting {
+            frames: options.times.len(),
+        })?;
+        let frames = write_frames(self.learned(), &frame_options, |frame| {
+            emit(extracted(frame, &frame_options))?;
+            Ok(!stop.is_set())
+        })?;
+        if frames.len() < options.times.len() {
+            return Err(Error::interruption(format!(
+                "stopped after {} of {} surfaces",
+                frames.len(),
+                options.times.len()
+            )));
+        }
+        show(&frames, &frame_options)?;
+        Ok(frame_options.folder.join("frames.json"))
+    }
+}
+
+fn extracted(frame: &Frame, options: &FrameOptions) -> Event {
+    Event::Extracted {
+        time: frame.entry.time,
+        path: options.folder.join(&frame.entry.surface),
+        vertices: frame.mesh.vertices.len(),
+        triangles: frame.mesh.triangles.len(),
+        components: frame.components,
+        left_out: frame.left_out,
+        consistency: frame.entry.consistency,
+        touches_box: frame.touches_box,
+    }
+}
+
+/// At most this many surfaces fit side by side and can still be told apart.
+const SHOWN: usize = 9;
+
+/// `preview.png`: up to nine of the frames, evenly chosen.
+fn show(frames: &[Frame], options: &FrameOptions) -> io::Result<()> {
+    let count = frames.len().min(SHOWN);
+    let chosen = (0..count).map(|k| match count {
+        1 => &frames[0],
+        _ => &frames[k * (frames.len() - 1) / (count - 1)],
+    });
+    let panels: Vec<_> = chosen
+        .filter(|frame| !frame.mesh.triangles.is_empty())
+        .map(|frame| picture::Frame {
+            vertices: &frame.mesh.vertices,
+            triangles: &frame.mesh.triangles,
+            time: frame.entry.time as f32,
+        })
+        .collect();
+    if panels.is_empty() {
+        return Ok(());
+    }
+    let path = options.folder.join("preview.png");
+    picture::strip(&panels, &picture::View::default(), &path).map_err(io::Error::other)
+}

@@ -1,0 +1,88 @@
+//! From a method that was trained, or a checkpoint of it, to surfaces and motion.
+
+use isomorph_training::deformation::Deformation;
+use isomorph_training::engine::Engine;
+
+use super::checkpoint::Checkpoint;
+use crate::error::{Error, Result};
+use crate::recipe::{MethodName, Recipe};
+use crate::shape::{self, Bounds, Normalisation};
+use crate::surface::SurfaceMesh;
+use crate::surface::learned::Learned;
+
+/// The frame of the key frames: where the user's coordinates lie in the networks'.
+#[derive(Clone, Copy, Debug)]
+pub struct Frame {
+    pub normalisation: Normalisation,
+    pub bounds: Bounds,
+}
+
+/// What a method has learned so far.
+///
+/// # Errors
+/// If the method has no surface of its own and the source is not a mesh that could be carried.
+pub fn learned(
+    deformation: Box<dyn Deformation>,
+    recipe: &Recipe,
+    frame: Frame,
+) -> Result<Learned> {
+    let template = match deformation.field() {
+        Some(_) => None,
+        None => Some(template(recipe, &frame.normalisation)?),
+    };
+    Ok(Learned {
+        deformation,
+        template,
+        normalisation: frame.normalisation,
+        bounds: frame.bounds.padded(recipe.training.box_margin as f32),
+    })
+}
+
+/// Whether the source is what the method needs it to be, to be asked before there is a run.
+///
+/// # Errors
+/// If the method carries the source's mesh and it is a cloud.
+pub fn check(recipe: &Recipe, normalisation: &Normalisation) -> Result<()> {
+    if matches!(
+        recipe.method.name,
+        MethodName::Eigenbasis | MethodName::Nfgp
+    ) {
+        template(recipe, normalisation)?;
+    }
+    Ok(())
+}
+
+/// The source's own mesh, normalised.
+fn template(recipe: &Recipe, normalisation: &Normalisation) -> Result<SurfaceMesh> {
+    let source = shape::read(&recipe.data.source)?;
+    if !source.is_mesh() {
+        return Err(Error::usage(format!(
+            "{}: a point cloud: the method {} gives no surface of its own and carries the source's \
+             mesh; give a mesh, or choose another method.name",
+            source.path.display(),
+            recipe.method.name
+        )));
+    }
+    let vertices = source.vertices.iter().map(|x| normalisation.apply(*x));
+    Ok(SurfaceMesh {
+        vertices: vertices.collect(),
+        triangles: source.triangles,
+        normals: None,
+    })
+}
+
+/// What a checkpoint holds.
+///
+/// # Errors
+/// If it is damaged, and what [`learned`] refuses.
+pub fn load(checkpoint: &Checkpoint, recipe: &Recipe, engine: &dyn Engine) -> Result<Learned> {
+    let state = &checkpoint.state;
+    let mut trainer = engine.method(recipe, &state.bounds)?;
+    let restored = trainer.restore(&checkpoint.records()?);
+    restored.map_err(|error| checkpoint.damaged(error))?;
+    let frame = Frame {
+        normalisation: state.normalisation,
+        bounds: state.bounds,
+    };
+    learned(trainer.deformation(), recipe, frame)
+}

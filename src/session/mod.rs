@@ -1,0 +1,42 @@
+//! What a program does with a run: train it, go on with it, open it, extract and measure it. Front ends use
+//! these and hold no more than words.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | `train.rs` | [`Session`]: a run from its recipe, or from its newest checkpoint |
+//! | `trained.rs` | [`Trained`]: a run that is opened, and what can be asked of it |
+//! | `extract.rs` | the surfaces of a run as files, with a picture of them |
+//! | `evaluate.rs`, `measure.rs` | a run held against the true frames between its key frames |
+//! | `compare.rs`, `compared.rs` | methods side by side on pairs of frames |
+//! | `pairs.rs`, `normals.rs` | correspondences and normals found from shapes alone |
+//! | `bench.rs` | what a step costs on this machine |
+//! | `describe.rs` | what a file or a run is |
+//! | `prepare.rs` | the shapes of a recipe made ready |
+//! | `learner.rs` | the loop that trains a method |
+//! | `learned.rs` | from a method or a checkpoint to surfaces and motion |
+//! | `folder.rs`, `checkpoint.rs` | the folder of a run, and whole checkpoints or none |
+//! | `log.rs`, `metrics.rs` | what a run leaves in writing: `run.log`, `metrics.jsonl` |
+//! | `stop.rs` | a flag that ends the work early |
+
+pub mod bench;
+pub mod checkpoint;
+pub mod compare;
+mod compared;
+pub mod describe;
+pub mod evaluate;
+pub mod extract;
+pub mod folder;
+mod learned;
+pub mod learner;
+mod log;
+mod measure;
+pub mod metrics;
+pub mod normals;
+pub mod pairs;
+mod prepare;
+pub mod stop;
+pub mod train;
+pub mod trained;
+
+pub use train::Session;
+pub use trained::Trained;

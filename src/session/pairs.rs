@@ -1,0 +1,80 @@
+//! Corresponding vertices of two shapes, found from the shapes alone, and a picture of how far to trust them.
+
+use std::path::Path;
+
+use crate::atomic::write_atomically;
+use crate::compare::{ChartError, Line, Panel, line_chart};
+use crate::error::{Error, Result};
+use crate::matching::{MatchOptions, Matching, match_shapes};
+use crate::shape::Shape;
+
+/// Finds which vertices of two shapes correspond: two poses or states of one thing, as meshes or point
+/// clouds, complete or with parts missing. The same shapes and options give the same pairs, whatever the
+/// number of cores.
+///
+/// # Errors
+/// An option out of range; a shape without area; no pair that is sure enough.
+pub fn find(source: &Shape, target: &Shape, options: &MatchOptions) -> Result<Matching> {
+    Ok(match_shapes(source, target, options)?)
+}
+
+impl Matching {
+    /// Writes `source_index,target_index,confidence` lines, as `data.correspondences` reads them.
+    ///
+    /// # Errors
+    /// What the file system says; the message names the file.
+    pub fn write_pairs(&self, path: &Path) -> Result<()> {
+        Ok(self.write_csv(path)?)
+    }
+
+    /// Draws the round-trip error: the share of points that come back to within a distance, as SVG.
+    ///
+    /// # Errors
+    /// A file whose name does not end in `.svg`; what the file system says.
+    pub fn write_picture(&self, path: &Path) -> Result<()> {
+        let is_svg = |extension: &std::ffi::OsStr| extension.eq_ignore_ascii_case("svg");
+        if !path.extension().is_some_and(is_svg) {
+            let path = path.display();
+            return Err(Error::usage(format!("{path}: must end in .svg")));
+        }
+        let figure = figure(self)?;
+        write_atomically(path, |out| out.write_all(figure.as_bytes()))?;
+        Ok(())
+    }
+}
+
+/// Places at which a distribution is drawn.
+const PLACES: usize = 200;
+
+/// The share of points that come back to within a distance, over the distance.
+fn figure(found: &Matching) -> std::result::Result<String, ChartError> {
+    let line = |label: &str, sorted: &[f64]| {
+        let last = sorted.len() - 1;
+        let place = |k: usize| {
+            let share = k as f64 / PLACES as f64;
+            [
+                sorted[(share * last as f64).round() as usize],
+                100.0 * share,
+            ]
+        };
+        Line {
+            label: label.to_owned(),
+            points: (0..=PLACES).map(place).collect(),
+            ..Line::default()
+        }
+    };
+    let cycle = &found.cycle;
+    let most = cycle.source.quantile_95.max(cycle.target.quantile_95);
+    let panel = Panel {
+        title: "share of points that come back to within a distance".to_owned(),
+        x_label: "distance from where they began (normalised)".to_owned(),
+        y_label: "points (%)".to_owned(),
+        x_range: (most > 0.0).then_some([0.0, 1.5 * most]),
+        lines: vec![
+            line("source to target and back", &cycle.source.sorted),
+            line("target to source and back", &cycle.target.sorted),
+        ],
+        ..Panel::default()
+    };
+    line_chart("Round-trip error", &[panel])
+}

@@ -1,0 +1,125 @@
+//! The shapes of a recipe made ready, their pairs found first where the recipe asks for it.
+
+use std::path::Path;
+
+use crate::error::Result;
+use crate::event::Event;
+use crate::matching::{MatchOptions, Matching, match_shapes};
+use crate::recipe::{self, Recipe};
+use crate::session::folder::RunFolder;
+use crate::shape::{
+    self, CorrespondenceSource, Correspondences, DataOptions, Keyframes, NormalSource, Shape,
+};
+
+/// Shapes ready for training.
+pub struct Prepared {
+    pub keyframes: Keyframes,
+    /// What matching found just now, which the run does not hold yet.
+    found: Option<Matching>,
+}
+
+/// Reads the shapes of a recipe.
+///
+/// # Errors
+/// What [`shape::read`] refuses.
+pub fn read(recipe: &Recipe) -> Result<Vec<Shape>> {
+    let files = [&recipe.data.source, &recipe.data.target];
+    let shapes = files.into_iter().map(|path| shape::read(path));
+    Ok(shapes.collect::<std::result::Result<_, _>>()?)
+}
+
+/// Makes the shapes of a recipe ready. Pairs that are to be found are read from `stored` if that
+/// file exists.
+///
+/// # Errors
+/// What [`shape::prepare`] and [`match_shapes`] refuse.
+pub fn prepare(
+    recipe: &Recipe,
+    shapes: &[Shape],
+    stored: Option<&Path>,
+    emit: &mut dyn FnMut(&Event),
+) -> Result<Prepared> {
+    let (source, found) = match &recipe.data.correspondences {
+        recipe::Correspondences::None => (CorrespondenceSource::None, None),
+        recipe::Correspondences::SameVertices => (CorrespondenceSource::SameVertices, None),
+        recipe::Correspondences::File(path) => (CorrespondenceSource::File(path.clone()), None),
+        recipe::Correspondences::Match => {
+            let (known, found) = matched(recipe, shapes, stored, emit)?;
+            (CorrespondenceSource::Pairs(known), found)
+        }
+    };
+    let keyframes = shape::prepare(shapes, &options(recipe, source))?;
+    Ok(Prepared { keyframes, found })
+}
+
+/// The pairs of the first two shapes: those of an earlier search if they are there, else found now.
+fn matched(
+    recipe: &Recipe,
+    shapes: &[Shape],
+    stored: Option<&Path>,
+    emit: &mut dyn FnMut(&Event),
+) -> Result<(Correspondences, Option<Matching>)> {
+    let (source, target) = (&shapes[0], &shapes[1]);
+    if let Some(path) = stored.filter(|path| path.is_file()) {
+        return Ok((Correspondences::read_csv(path, source, target)?, None));
+    }
+    emit(&Event::Matching);
+    let options = MatchOptions {
+        points: recipe.data.points,
+        seed: recipe.training.seed,
+        ..MatchOptions::default()
+    };
+    let found = match_shapes(source, target, &options)?;
+    Ok((found.correspondences(), Some(found)))
+}
+
+/// Makes the shapes of a recipe ready where only their points count: no pairs are read or found.
+///
+/// # Errors
+/// What [`shape::prepare`] refuses.
+pub fn points_only(recipe: &Recipe) -> Result<Keyframes> {
+    let shapes = read(recipe)?;
+    Ok(shape::prepare(
+        &shapes,
+        &options(recipe, CorrespondenceSource::None),
+    )?)
+}
+
+/// What a recipe says of its shapes.
+fn options(recipe: &Recipe, pairs: CorrespondenceSource) -> DataOptions {
+    let section = &recipe.data;
+    DataOptions {
+        times: vec![0.0, 1.0],
+        between: vec![pairs],
+        points: section.points,
+        correspondence_fraction: section.correspondence_fraction,
+        normals: match section.normals {
+            recipe::NormalSource::Auto => NormalSource::Auto,
+            recipe::NormalSource::Given => NormalSource::Given,
+            recipe::NormalSource::Estimate => NormalSource::Estimate,
+            recipe::NormalSource::None => NormalSource::None,
+        },
+        seed: recipe.training.seed,
+    }
+}
+
+impl Prepared {
+    /// Writes pairs that were found into the run, for whoever goes on with it, and gives what is to be
+    /// reported of them.
+    ///
+    /// # Errors
+    /// What the file system says; the message names the file.
+    pub fn keep(&self, run: &RunFolder) -> std::io::Result<Option<Event>> {
+        let Some(found) = &self.found else {
+            return Ok(None);
+        };
+        found.write_csv(&run.pairs())?;
+        let (coverage, cycle) = (&found.coverage, &found.cycle.source);
+        Ok(Some(Event::Matched {
+            pairs: found.pairs.len(),
+            coverage: [coverage.source, coverage.target],
+            cycle: [cycle.median, cycle.quantile_95],
+            seconds: found.seconds,
+        }))
+    }
+}

@@ -1,0 +1,281 @@
+//! A run in training, from its recipe or from its newest checkpoint.
+
+use std::path::{Path, PathBuf};
+
+use isomorph_training::engine::Engine;
+
+use super::checkpoint::{Checkpoint, CheckpointError};
+use super::folder::RunFolder;
+use super::learned::{self, Frame};
+use super::learner::{self, Learner, Outcome};
+use super::log::RunLog;
+use super::prepare::{self, Prepared};
+use super::stop::StopFlag;
+use super::trained::Trained;
+use crate::atomic::write_atomically;
+use crate::backend::Backend;
+use crate::error::{Error, Result};
+use crate::event::Event;
+use crate::recipe::Recipe;
+use crate::session::extract::ExtractOptions;
+use crate::shape::Shape;
+
+/// A run that is about to be trained: a recipe, its shapes, a folder and a backend.
+///
+/// # Examples
+/// Two shapes to a surface half-way between them:
+/// ```
+/// use isomorph::{Backend, Recipe, Session, Shape};
+///
+/// # fn sphere(x: f64) -> Shape {
+/// #     let points = (0..500).map(|k| {
+/// #         let z = 1.0 - (2 * k + 1) as f64 / 500.0;
+/// #         let (ring, angle) = ((1.0 - z * z).sqrt(), 2.399_963 * k as f64);
+/// #         [x + ring * angle.cos(), ring * angle.sin(), z]
+/// #     });
+/// #     Shape::cloud(points.collect())
+/// # }
+/// # fn main() -> Result<(), isomorph::Error> {
+/// # let place = tempfile::tempdir().expect("a temporary folder");
+/// # let (a, b) = (place.path().join("a.ply"), place.path().join("b.ply"));
+/// # sphere(0.0).write(&a)?;
+/// # sphere(0.5).write(&b)?;
+/// let mut recipe = Recipe::between(&a, &b)?;
+/// for key in ["preset=quick", "data.correspondences=same-vertices", "result.frames=0"] {
+///     recipe = recipe.with(key)?;
+/// }
+/// # for key in ["training.steps=4", "training.batch=100", "implicit.width=8", "velocity.width=8"] {
+/// #     recipe = recipe.with(key)?;
+/// # }
+/// let mut session = Session::prepare(recipe, place.path().join("run"), Backend::Flex)?;
+/// let trained = session.train(|event| eprintln!("{event}"))?;
+/// let surface = trained.surface(0.5, 48)?;
+/// println!("{} triangles", surface.triangles.len());
+/// # Ok(())
+/// # }
+/// ```
+pub struct Session {
+    recipe: Recipe,
+    shapes: Vec<Shape>,
+    folder: PathBuf,
+    start: Start,
+    engine: Box<dyn Engine>,
+    stop: StopFlag,
+}
+
+/// Where training begins.
+enum Start {
+    /// At its first step.
+    New {
+        /// Whether a run that is there already is deleted.
+        replace: bool,
+    },
+    /// Where the run has come to.
+    GoOn {
+        /// The newest checkpoint; none if the run stopped before its first.
+        checkpoint: Option<Box<Checkpoint>>,
+        /// Whether the run's recipe is written anew.
+        rewrite: bool,
+    },
+}
+
+impl Session {
+    /// A new run. The shapes are read and the backend is opened, but nothing is written before
+    /// [`Session::train`].
+    ///
+    /// # Errors
+    /// A shape that cannot be read, a backend that cannot be opened.
+    pub fn prepare(recipe: Recipe, folder: impl AsRef<Path>, backend: Backend) -> Result<Self> {
+        Ok(Self {
+            engine: backend.open()?,
+            shapes: prepare::read(&recipe)?,
+            recipe,
+            folder: folder.as_ref().to_path_buf(),
+            start: Start::New { replace: false },
+            stop: StopFlag::default(),
+        })
+    }
+
+    /// A run that goes on from its newest checkpoint, on any backend. `changes` are keys of its recipe with
+    /// new values, as in `training.steps=2000`; those of its networks cannot change.
+    ///
+    /// # Errors
+    /// A folder that is no run, a damaged checkpoint, a change that the checkpoint does not fit.
+    pub fn resume(folder: impl AsRef<Path>, changes: &[String], backend: Backend) -> Result<Self> {
+        let run = RunFolder::open(folder.as_ref())?;
+        let recipe = Recipe::read(&run.recipe(), changes)?;
+        let checkpoint = match Checkpoint::newest(&run.checkpoints()) {
+            Ok(checkpoint) => Some(Box::new(checkpoint)),
+            // Stopped before its first checkpoint: it starts again, with the same seed.
+            Err(CheckpointError::None(_)) => None,
+            Err(damaged) => return Err(damaged.into()),
+        };
+        Ok(Self {
+            engine: backend.open()?,
+            shapes: prepare::read(&recipe)?,
+            recipe,
+            folder: run.path().to_path_buf(),
+            start: Start::GoOn {
+                checkpoint,
+                rewrite: !changes.is_empty(),
+            },
+            stop: StopFlag::default(),
+        })
+    }
+
+    /// Deletes a run that is in the folder already, when training starts; nothing but a run ever is.
+    #[must_use]
+    pub fn replacing(mut self) -> Self {
+        if let Start::New { replace } = &mut self.start {
+            *replace = true;
+        }
+        self
+    }
+
+    /// The flag that stops the training after its present step, with a checkpoint.
+    pub fn stop_flag(&self) -> StopFlag {
+        self.stop.clone()
+    }
+
+    /// Ends early when this flag is set, instead of one of its own.
+    #[must_use]
+    pub fn stopped_by(self, stop: StopFlag) -> Self {
+        Self { stop, ..self }
+    }
+
+    /// The recipe, every key with its value.
+    pub fn recipe(&self) -> &Recipe {
+        &self.recipe
+    }
+
+    /// Trains to the last step and writes the surfaces that the recipe asks for. `on_event` hears of
+    /// everything as it happens.
+    ///
+    /// # Errors
+    /// Of kind [`Interruption`](crate::ErrorKind::Interruption) if the stop flag was set: a checkpoint then
+    /// holds all steps so far. Else what keeps the run from being trained; the checkpoints written so far
+    /// stay.
+    pub fn train(&mut self, mut on_event: impl FnMut(&Event)) -> Result<Trained> {
+        self.train_dyn(&mut on_event)
+    }
+
+    fn train_dyn(&mut self, on_event: &mut dyn FnMut(&Event)) -> Result<Trained> {
+        let mut begun = match &self.start {
+            Start::New { replace } => self.begin(*replace, on_event)?,
+            Start::GoOn { .. } => self.go_on(on_event)?,
+        };
+        let (run, log) = (&begun.run, &mut begun.log);
+        let mut emit = |event: Event| {
+            on_event(&event);
+            log.record(&event)
+        };
+        let outcome = begun
+            .learner
+            .run(&run.checkpoints(), self.stop.flag(), &mut emit)?;
+        // What is done is the run's: training again goes on from there.
+        self.start = Start::GoOn {
+            checkpoint: Checkpoint::newest(&run.checkpoints()).ok().map(Box::new),
+            rewrite: false,
+        };
+        if outcome == Outcome::Interrupted {
+            return Err(Error::interruption(format!(
+                "{}: training was stopped; its newest checkpoint holds all steps so far",
+                run.path().display()
+            )));
+        }
+        let deformation = begun.learner.trainer().deformation();
+        let learned = learned::learned(deformation, &self.recipe, begun.frame)?;
+        let trained = Trained::new(learned, self.recipe.clone(), begun.run);
+        if self.recipe.result.frames > 0 {
+            let options = ExtractOptions::of(&self.recipe);
+            trained.extract_into(&options, &self.stop, log, on_event)?;
+        }
+        Ok(trained)
+    }
+
+    /// A run before its first step: everything is checked before its folder is made.
+    fn begin(&self, replace: bool, on_event: &mut dyn FnMut(&Event)) -> Result<Begun> {
+        let prepared = prepare::prepare(&self.recipe, &self.shapes, None, on_event)?;
+        learned::check(&self.recipe, &prepared.keyframes.normalisation)?;
+        let learner = Learner::new(self.recipe.clone(), &prepared.keyframes, &*self.engine)?;
+        let run = RunFolder::create(&self.folder, &self.recipe.to_toml(), replace)?;
+        let mut log = RunLog::open(run.path(), None)?;
+        let matched = prepared.keep(&run)?;
+        let notes = prepared.keyframes.notes.iter().cloned().map(Event::Note);
+        for event in matched.into_iter().chain(notes) {
+            on_event(&event);
+            log.record(&event)?;
+        }
+        Ok(Begun::new(run, log, learner, &prepared))
+    }
+
+    /// A run where its newest checkpoint left it: what is refused leaves it as it was.
+    fn go_on(&self, on_event: &mut dyn FnMut(&Event)) -> Result<Begun> {
+        let Start::GoOn {
+            checkpoint,
+            rewrite,
+        } = &self.start
+        else {
+            unreachable!("a run that goes on");
+        };
+        let run = RunFolder::open(&self.folder)?;
+        let pairs = run.pairs();
+        let prepared = prepare::prepare(&self.recipe, &self.shapes, Some(&pairs), on_event)?;
+        let keyframes = &prepared.keyframes;
+        let changes = match checkpoint {
+            Some(checkpoint) => {
+                learner::fits(checkpoint, &self.recipe, keyframes)?;
+                checkpoint.recipe()?.changes(&self.recipe)
+            }
+            None => Vec::new(),
+        };
+        let step = checkpoint.as_ref().map_or(0, |found| found.state.step);
+        let mut log = RunLog::open(run.path(), Some(step))?;
+        let mut events: Vec<Event> = prepared.keep(&run)?.into_iter().collect();
+        if checkpoint.is_none() {
+            let note = "no checkpoint yet: the run starts again from its first step";
+            events.push(Event::Note(note.to_owned()));
+        }
+        for change in changes {
+            let note = format!("changed since the checkpoint: {change}");
+            events.push(Event::Note(note));
+        }
+        for event in &events {
+            on_event(event);
+            log.record(event)?;
+        }
+        if *rewrite {
+            let text = self.recipe.to_toml();
+            write_atomically(&run.recipe(), |out| out.write_all(text.as_bytes()))?;
+        }
+        let (recipe, engine) = (self.recipe.clone(), &*self.engine);
+        let learner = match checkpoint {
+            Some(checkpoint) => Learner::resume(recipe, keyframes, engine, checkpoint)?,
+            None => Learner::new(recipe, keyframes, engine)?,
+        };
+        Ok(Begun::new(run, log, learner, &prepared))
+    }
+}
+
+/// A run whose folder is there and whose learner is ready.
+struct Begun {
+    run: RunFolder,
+    log: RunLog,
+    learner: Learner,
+    frame: Frame,
+}
+
+impl Begun {
+    fn new(run: RunFolder, log: RunLog, learner: Learner, prepared: &Prepared) -> Self {
+        let keyframes = &prepared.keyframes;
+        Self {
+            run,
+            log,
+            learner,
+            frame: Frame {
+                normalisation: keyframes.normalisation,
+                bounds: keyframes.bounds,
+            },
+        }
+    }
+}
