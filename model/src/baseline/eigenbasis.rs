@@ -30,12 +30,11 @@ use burn::module::{Module, Param, ParamId};
 use burn::tensor::backend::Backend;
 use burn::tensor::{Tensor, TensorData};
 
-use crate::backend::ModelBackend;
+use crate::autodiff::{ModelBackend, product};
+use crate::flow::morph::{Motion, follow};
+use crate::flow::trajectory::{Integrator, Steps, integrate};
 use crate::loss;
-use crate::morph::{Motion, follow};
 use crate::objective::Objective;
-use crate::product::product;
-use crate::trajectory::{Integrator, Steps, integrate};
 
 /// A quarter of the dimension: the exponent of the eigenvalue in a mode's standard deviation.
 const DECAY: f64 = 0.75;
@@ -231,8 +230,8 @@ fn products<B: Backend>(a: Tensor<B, 2>, b: Tensor<B, 2>) -> Tensor<B, 2> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::testing::{check_gradients, directions, trained};
     use super::*;
+    use crate::testing::learning::{check_gradients, directions, trained};
     use crate::testing::{Plain, Train, host, points, shaken};
 
     fn config(modes: usize) -> EigenbasisConfig {

@@ -36,12 +36,10 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal, Uniform};
 
-use super::ends::EndSamples;
-use crate::activation::Activation;
-use crate::backend::ModelBackend;
-use crate::morph::Geometry;
+use crate::autodiff::{Activation, ModelBackend, product};
+use crate::flow::Geometry;
+use crate::flow::end_terms::EndSamples;
 use crate::objective::Objective;
-use crate::product::product;
 
 /// Standard deviation of the first layer's weights for the position, in radians per normalised unit.
 const BANDWIDTH: f64 = 4.0;
@@ -232,8 +230,8 @@ impl<B: ModelBackend> Geometry<B> for LipMlp<B> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::testing::{check_gradients, directions, radius, spheres, trained};
     use super::*;
+    use crate::testing::learning::{check_gradients, directions, radius, spheres, trained};
     use crate::testing::{Plain, Train, column, host, points, shaken};
 
     fn config(depth: usize, width: usize) -> LipMlpConfig {

@@ -10,16 +10,15 @@
 //! ```
 //!
 //! Value and lanes (three tangents, then a time tangent and the Laplacian where asked for) are stacked
-//! along the batch axis: one matrix product and one activation ([`crate::jet`]) per layer, which one
+//! along the batch axis: one matrix product and one activation ([`crate::autodiff::jet`]) per layer, which one
 //! level of autodiff differentiates by the weights.
 
 use burn::tensor::{Tensor, TensorData};
 
-use super::{VelocityJet, VelocityRequest};
-use crate::backend::ModelBackend;
-use crate::encoding::encoding_derivatives;
-use crate::jet::Lanes;
-use crate::velocity_net::VelocityNet;
+use super::jets::{VelocityJet, VelocityRequest};
+use crate::autodiff::{Lanes, ModelBackend};
+use crate::nets::VelocityNet;
+use crate::nets::encoding::encoding_derivatives;
 
 /// `V`, `J`, and what `request` names, in one sweep.
 pub fn velocity_jet<B: ModelBackend>(

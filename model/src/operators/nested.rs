@@ -12,10 +12,9 @@ use burn::tensor::Tensor;
 use burn::tensor::backend::Backend;
 use burn_autodiff::Autodiff;
 
-use super::{ImplicitJet, VelocityJet, VelocityRequest};
-use crate::backend::ModelBackend;
-use crate::implicit_net::ImplicitNet;
-use crate::velocity_net::VelocityNet;
+use super::jets::{ImplicitJet, VelocityJet, VelocityRequest};
+use crate::autodiff::ModelBackend;
+use crate::nets::{ImplicitNet, VelocityNet};
 
 /// A copy of the tensor one level up, whose gradient is wanted there.
 fn lift<B: ModelBackend>(tensor: Tensor<B, 2>) -> Tensor<Autodiff<B>, 2> {

@@ -10,12 +10,10 @@
 
 use burn::tensor::Tensor;
 
-use super::ImplicitJet;
-use crate::backend::ModelBackend;
-use crate::encoding::encoding_derivatives;
-use crate::implicit_net::ImplicitNet;
-use crate::mlp::Mlp;
-use crate::velocity_net::VelocityNet;
+use super::jets::ImplicitJet;
+use crate::autodiff::ModelBackend;
+use crate::nets::encoding::encoding_derivatives;
+use crate::nets::{ImplicitNet, Mlp, VelocityNet};
 
 /// `f`, `grad f`, `f_t`.
 pub fn implicit_jet<B: ModelBackend>(

@@ -29,11 +29,10 @@ use burn::tensor::{Tensor, TensorData};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::{FixedPoint, NfgpConfig};
-use crate::backend::ModelBackend;
-use crate::encoding::{encode, encoded_width, encoding_derivatives};
-use crate::mlp::Dense;
-use crate::product::product;
+use super::config::{FixedPoint, NfgpConfig};
+use crate::autodiff::{ModelBackend, product};
+use crate::nets::encoding::{encode, encoded_width, encoding_derivatives};
+use crate::nets::mlp::Dense;
 
 /// The initial norm of the output layer: a block starts near the identity.
 const INITIAL_OUTPUT: f64 = 0.01;

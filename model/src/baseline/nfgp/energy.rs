@@ -25,8 +25,8 @@
 use burn::tensor::Tensor;
 use burn::tensor::backend::Backend;
 
-use super::Nfgp;
-use crate::backend::ModelBackend;
+use super::deformation::Nfgp;
+use crate::autodiff::ModelBackend;
 use crate::objective::Objective;
 use crate::operators::length;
 

@@ -18,10 +18,11 @@ use burn::tensor::Tensor;
 use burn::tensor::backend::Backend;
 
 use super::block::{Normalised, largest};
+use super::config::{FixedPoint, NfgpConfig};
+use super::deformation::Nfgp;
 use super::energy::{cross, dot};
-use super::{FixedPoint, Nfgp, NfgpConfig};
-use crate::backend::ModelBackend;
-use crate::morph::Motion;
+use crate::autodiff::ModelBackend;
+use crate::flow::Motion;
 
 /// Newton steps after which the inverse at a time in between ends in any case; three are usual.
 const NEWTON_STEPS: usize = 10;

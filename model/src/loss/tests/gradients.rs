@@ -4,16 +4,13 @@ use burn::module::{AutodiffModule, ModuleMapper, ModuleVisitor, Param};
 use burn::optim::GradientsParams;
 use burn::tensor::Tensor;
 
-use crate::activation::Activation;
-use crate::backend::TrainBackend;
-use crate::implicit_net::{ImplicitNet, ImplicitNetConfig};
+use crate::autodiff::{Activation, TrainBackend};
+use crate::flow::trajectory::{Integrator, Steps, integrate};
+use crate::flow::transport::transport;
 use crate::loss::*;
-use crate::operators::{
-    Derivatives, ImplicitJet, Operators, VelocityJet, VelocityRequest, transport,
-};
+use crate::nets::{ImplicitNet, ImplicitNetConfig, VelocityNet, VelocityNetConfig};
+use crate::operators::{Derivatives, ImplicitJet, Operators, VelocityJet, VelocityRequest};
 use crate::testing::{column, host, points, shaken};
-use crate::trajectory::{Integrator, Steps, integrate};
-use crate::velocity_net::{VelocityNet, VelocityNetConfig};
 
 /// What a term is made of, on the training backend.
 struct Scene<B: TrainBackend> {

@@ -2,8 +2,8 @@
 
 use burn::tensor::Tensor;
 
-use crate::backend::ModelBackend;
-use crate::trajectory::{Integrator, Steps, integrate};
+use super::trajectory::{Integrator, Steps, integrate};
+use crate::autodiff::ModelBackend;
 
 /// Half the step of the central differences of [`Geometry::gradient`], in normalised units: their error,
 /// `h^2 f''' / 6` and `eps |f| / h`, is below 1e-3 on fields that vary over a twentieth of a unit.

@@ -3,7 +3,7 @@
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal, Uniform};
 
-use crate::mlp::{HostLayer, MlpConfig};
+use super::mlp::{HostLayer, MlpConfig};
 
 /// Normal weights of standard deviation `sqrt(2 / inputs)` and zero biases (He et al. 2015), the
 /// output layer scaled by `output_scale`.

@@ -1,5 +1,7 @@
 //! What the tests of this crate share: the backends they run on, and the way in and out of tensors.
 
+pub mod learning;
+
 use burn::module::{Module, ModuleMapper, Param};
 use burn::tensor::{Tensor, TensorData, backend::Backend};
 use burn_autodiff::Autodiff;

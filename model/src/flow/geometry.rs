@@ -9,7 +9,7 @@
 //! that is learnt of the shapes stays sharp in between; where the flow takes the source exactly onto the
 //! target the two are one surface, and `f_t + V.grad f = h - g` says by how much they are not.
 //!
-//! `g` and `h` are the end fields of [`crate::baseline::blend`], which is this geometry at rest.
+//! `g` and `h` are the [`EndFields`]; without a velocity this is their linear blend.
 //!
 //! # Differs from the paper
 //! The paper trains one network `f(x, t)` under the level-set equation; that geometry is
@@ -18,13 +18,13 @@
 use burn::tensor::Tensor;
 use burn::tensor::backend::Backend;
 
-use crate::backend::ModelBackend;
-use crate::baseline::blend::{SdfBlend, between};
-use crate::morph::{Carried, Geometry};
-use crate::operators::reverse;
-use crate::operators::{Derivatives, transport_gradient};
-use crate::trajectory::{Integrator, Steps, integrate, steps_within};
-use crate::velocity_net::VelocityNet;
+use super::end_fields::{EndFields, between};
+use super::morph::{Carried, Geometry};
+use super::trajectory::{Integrator, Steps, integrate, steps_within};
+use super::transport::transport_gradient;
+use crate::autodiff::ModelBackend;
+use crate::nets::VelocityNet;
+use crate::operators::{Derivatives, reverse};
 
 /// How exactly points are followed, in normalised units: a fifth of a cell at 256 cells to a side.
 const TOLERANCE: f64 = 1e-3;
@@ -38,7 +38,7 @@ const NEAR: f64 = 0.05;
 /// Two end fields and the velocity field that carries them.
 #[derive(Debug)]
 pub struct FlowGeometry<B: Backend> {
-    ends: SdfBlend<B>,
+    ends: EndFields<B>,
     velocity: VelocityNet<B>,
     /// Of the Runge-Kutta integrator over all of time.
     steps: usize,
@@ -50,7 +50,7 @@ impl<B: ModelBackend> FlowGeometry<B> {
     /// steps take them.
     ///
     /// `probes`: points throughout the space of both shapes, `[n, 3]`.
-    pub fn new(ends: SdfBlend<B>, velocity: VelocityNet<B>, probes: Tensor<B, 2>) -> Self {
+    pub fn new(ends: EndFields<B>, velocity: VelocityNet<B>, probes: Tensor<B, 2>) -> Self {
         let steps = needed(&ends, &velocity, probes);
         Self {
             ends,
@@ -156,7 +156,7 @@ impl<B: ModelBackend> Carried<B> for FlowGeometry<B> {
 
 /// Steps over the whole span of time that follow the probes near each surface within the tolerance.
 fn needed<B: ModelBackend>(
-    ends: &SdfBlend<B>,
+    ends: &EndFields<B>,
     velocity: &VelocityNet<B>,
     probes: Tensor<B, 2>,
 ) -> usize {
@@ -189,17 +189,16 @@ fn needed<B: ModelBackend>(
 
 #[cfg(test)]
 mod tests {
+    use super::super::end_fields::EndFieldsConfig;
+    use super::super::morph::Motion;
     use super::*;
-    use crate::activation::Activation;
-    use crate::baseline::blend::SdfBlendConfig;
-    use crate::implicit_net::ImplicitNetConfig;
-    use crate::morph::Motion;
+    use crate::autodiff::Activation;
+    use crate::nets::{ImplicitNetConfig, VelocityNetConfig};
     use crate::testing::{Plain, assert_close, column, host, numbers, points, shaken};
-    use crate::velocity_net::VelocityNetConfig;
 
     const X: [[f64; 3]; 3] = [[0.3, -0.2, 0.1], [-0.35, 0.15, 0.2], [0.05, 0.4, -0.3]];
 
-    fn networks(shake: f64) -> (SdfBlend<Plain>, VelocityNet<Plain>) {
+    fn networks(shake: f64) -> (EndFields<Plain>, VelocityNet<Plain>) {
         let activation = Activation::Softplus { beta: 5.0 };
         let (depth, width, frequencies, skip) = (2, 12, 0, 0);
         let implicit = ImplicitNetConfig {
@@ -219,7 +218,7 @@ mod tests {
             time_dependent: true,
         };
         let device = Default::default();
-        let ends = SdfBlendConfig { implicit }.init(3, &device);
+        let ends = EndFieldsConfig { implicit }.init(3, &device);
         let velocity = velocity.init(4, &device);
         (shaken(ends, 0.1), shaken(velocity, shake))
     }

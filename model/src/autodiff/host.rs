@@ -4,11 +4,11 @@
 use burn::tensor::TensorData;
 use burn::tensor::ops::FloatTensor;
 
-use crate::activation::Activation;
-use crate::backend::ModelBackend;
-use crate::jet::Lanes;
-use crate::kernel;
-use crate::machine::{self, Matrix};
+use super::activation::Activation;
+use super::backend::ModelBackend;
+use super::kernel;
+use super::lanes::Lanes;
+use super::machine::{self, Matrix};
 
 /// Measured on networks from 128 to 512 wide (`model/benches/README.md`): twice as many are a little faster
 /// still on two cores, and leave nothing for the others of a machine with more.

@@ -2,7 +2,7 @@
 //! start and an end time of its own, forwards or backwards (the paper, Section 3, "phi(x, t)").
 //!
 //! The state may be positions, `[n, 3]` with `rhs = V`, or positions and normals side by side, `[n, 6]`
-//! with `rhs = [V, -J^T n]` ([`crate::operators::transport`]).
+//! with `rhs = [V, -J^T n]` ([`super::transport`]).
 //!
 //! Method | order | evaluations per step
 //! ---|---|---
@@ -18,7 +18,7 @@
 use burn::tensor::Tensor;
 use burn::tensor::backend::Backend;
 
-use crate::operators::length;
+use crate::operators::length::length;
 
 /// An explicit Runge-Kutta method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

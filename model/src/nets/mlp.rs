@@ -11,10 +11,7 @@ use burn::module::{Module, Param, ParamId};
 use burn::tensor::backend::Backend;
 use burn::tensor::{Tensor, TensorData};
 
-use crate::activation::Activation;
-use crate::backend::ModelBackend;
-use crate::jet::Lanes;
-use crate::product::product;
+use crate::autodiff::{Activation, Lanes, ModelBackend, product};
 
 /// An affine layer, `x W + b`, of plain operations.
 ///

@@ -14,12 +14,10 @@ use burn::tensor::backend::Backend;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use crate::activation::Activation;
-use crate::backend::ModelBackend;
-use crate::encoding::{encode, encoded_width};
-use crate::initial;
-use crate::mlp::{Mlp, MlpConfig};
-use crate::morph::{Motion, follow};
+use super::encoding::{encode, encoded_width};
+use super::initial;
+use super::mlp::{Mlp, MlpConfig};
+use crate::autodiff::{Activation, ModelBackend};
 
 /// The output layer's share of its usual initial size: V starts near zero.
 const INITIAL_OUTPUT: f64 = 0.01;
@@ -100,11 +98,5 @@ impl<B: ModelBackend> VelocityNet<B> {
         } else {
             encoded
         }
-    }
-}
-
-impl<B: ModelBackend> Motion<B> for VelocityNet<B> {
-    fn carry(&self, x: Tensor<B, 2>, from: f64, to: f64) -> Tensor<B, 2> {
-        follow(|x, t| self.forward(x, t), x, from, to)
     }
 }

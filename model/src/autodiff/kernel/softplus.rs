@@ -12,7 +12,7 @@
 
 use pulp::{Arch, NullaryFnOnce};
 
-use super::{Pointwise, ROUND};
+use super::pointwise::{Pointwise, ROUND, vectorised};
 
 /// The softplus of sharpness `beta`.
 #[derive(Clone, Copy, Debug)]
@@ -104,13 +104,14 @@ fn twice_atanh(s: f32) -> f32 {
 
 #[cfg(test)]
 mod tests {
-    use crate::activation::Activation;
-    use crate::jet::Lanes;
-    use crate::kernel::jet;
+    use super::*;
 
-    fn softplus(beta: f32) -> Activation {
-        let beta = f64::from(beta);
-        Activation::Softplus { beta }
+    /// Values and slopes at inputs, in rows of `columns` without a bias.
+    fn softplus(beta: f32, z: &[f32], columns: usize) -> (Vec<f32>, Vec<f32>) {
+        let (mut value, mut slope) = (z.to_vec(), z.to_vec());
+        let (function, bias) = (Softplus::new(f64::from(beta)), vec![0.0; columns]);
+        function.evaluate(Arch::new(), &bias, &mut value, &mut slope);
+        (value, slope)
     }
 
     #[test]
@@ -120,7 +121,7 @@ mod tests {
                 .map(|k| 3e-4 * k as f32 / beta)
                 .collect();
             // In rows: one bias for each element of one would take the compiler's vectors away.
-            let (value, slope) = jet(&z, &[0.0; 1000], Lanes::VALUE, softplus(beta));
+            let (value, slope) = softplus(beta, &z, 1000);
             let width = 1.0 / f64::from(beta);
             for ((z, value), slope) in z.iter().zip(value).zip(slope) {
                 let z = f64::from(*z) * f64::from(beta);
@@ -143,7 +144,7 @@ mod tests {
     #[test]
     fn a_value_that_is_not_a_number_stays_one() {
         let inputs = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
-        let (value, slope) = jet(&inputs, &[0.0; 3], Lanes::VALUE, softplus(10.0));
+        let (value, slope) = softplus(10.0, &inputs, 3);
         assert!(
             value[0].is_nan() && slope[0].is_nan(),
             "{value:?} {slope:?}"

@@ -17,13 +17,10 @@ use burn::tensor::{Tensor, TensorData};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use crate::activation::Activation;
-use crate::backend::ModelBackend;
-use crate::encoding::{encode, encoded_width, encoding_scale};
-use crate::initial;
-use crate::mlp::{HostLayer, Mlp, MlpConfig};
-use crate::morph::Geometry;
-use crate::operators::reverse;
+use super::encoding::{encode, encoded_width, encoding_scale};
+use super::initial;
+use super::mlp::{HostLayer, Mlp, MlpConfig};
+use crate::autodiff::{Activation, ModelBackend};
 
 /// Under the root of the sphere that a sine network is added to, so that it is smooth at 0.
 const ROUNDING: f64 = 0.01;
@@ -181,22 +178,10 @@ impl<B: ModelBackend> ImplicitNet<B> {
     }
 }
 
-impl<B: ModelBackend> Geometry<B> for ImplicitNet<B> {
-    fn value(&self, x: Tensor<B, 2>, t: Tensor<B, 2>) -> Tensor<B, 2> {
-        self.forward(x, t)
-    }
-
-    /// By the written-out reverse sweep: exact, and the only way on a backend without autodiff.
-    fn gradient(&self, x: Tensor<B, 2>, t: Tensor<B, 2>) -> Tensor<B, 2> {
-        reverse::implicit_jet(self, x, t).gradient
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::operators::{Derivatives, Operators};
-    use crate::testing::{Plain, host, points};
+    use crate::testing::{Plain, Train, host, points};
 
     fn config(activation: Activation, frequencies: usize, skip: usize) -> ImplicitNetConfig {
         let sphere_radius = 0.4;
@@ -224,15 +209,14 @@ mod tests {
         for (activation, frequencies, skip) in cases {
             for seed in 0..3 {
                 let net =
-                    config(activation, frequencies, skip).init::<Plain>(seed, &Default::default());
-                let x = points::<Plain>(&directions(512)) * 0.4;
+                    config(activation, frequencies, skip).init::<Train>(seed, &Default::default());
+                let x = (points::<Train>(&directions(512)) * 0.4).require_grad();
                 let t = Tensor::full([512, 1], 0.3, &Default::default());
-                let jet = Derivatives::Forward.implicit_jet(&net, x, t);
-                let off = host(jet.value)
-                    .into_iter()
-                    .map(f64::abs)
-                    .fold(0.0, f64::max);
-                let norms = host(jet.gradient.powf_scalar(2.0).sum_dim(1).sqrt());
+                let value = net.forward(x.clone(), t);
+                let off = host(value.clone()).into_iter().map(f64::abs);
+                let off = off.fold(0.0, f64::max);
+                let gradient = x.grad(&value.sum().backward()).expect("f depends on x");
+                let norms = host(gradient.powf_scalar(2.0).sum_dim(1).sqrt());
                 let steep = norms.iter().map(|norm| (norm - 1.0).abs()).sum::<f64>() / 512.0;
                 let label = format!("{activation:?} m {frequencies} skip {skip} seed {seed}");
                 // Random weights of width 128 bend the sphere by some hundredths of its radius; the

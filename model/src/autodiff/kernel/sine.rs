@@ -17,7 +17,7 @@ use std::f32::consts::{FRAC_2_PI, FRAC_PI_2};
 
 use pulp::{Arch, NullaryFnOnce};
 
-use super::{Pointwise, ROUND};
+use super::pointwise::{Pointwise, ROUND, vectorised};
 
 /// The angle from which on `k` has more digits than its products with the parts of `pi/2` leave room for.
 const FAR: f32 = 4096.0 * FRAC_PI_2;
@@ -131,14 +131,14 @@ fn sine_and_cosine(angle: f32) -> (f32, f32) {
 
 #[cfg(test)]
 mod tests {
-    use crate::activation::Activation;
-    use crate::jet::Lanes;
-    use crate::kernel::jet;
+    use super::*;
 
     /// Values and slopes at inputs, in rows without a bias.
     fn sine(omega: f32, z: &[f32]) -> (Vec<f32>, Vec<f32>) {
-        let omega = f64::from(omega);
-        jet(z, &[0.0; 1000], Lanes::VALUE, Activation::Sine { omega })
+        let (mut value, mut slope) = (z.to_vec(), z.to_vec());
+        let function = Sine::new(f64::from(omega));
+        function.evaluate(Arch::new(), &[0.0; 1000], &mut value, &mut slope);
+        (value, slope)
     }
 
     /// Fails unless all are the sine and the cosine of the angles, in units of the last place of 1.

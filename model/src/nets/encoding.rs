@@ -14,8 +14,7 @@ use std::f64::consts::PI;
 
 use burn::tensor::Tensor;
 
-use crate::activation::Activation;
-use crate::backend::ModelBackend;
+use crate::autodiff::{Activation, ModelBackend};
 
 /// Columns of the encoding of a point with `frequencies` octaves: `3 (2 m + 1)`.
 pub const fn encoded_width(frequencies: usize) -> usize {

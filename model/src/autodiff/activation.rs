@@ -6,13 +6,13 @@
 //! | sine | `sin(omega z)` | `omega cos(omega z)` | `-omega^2 s` | `-omega^2 s'` |
 //!
 //! The paper uses softplus (Section 4) and leaves beta open; the sine is that of SIREN (Sitzmann et
-//! al. 2020). Here they are written in ordinary tensor operations, for any backend; [`crate::jet`] makes one
+//! al. 2020). Here they are written in ordinary tensor operations, for any backend; [`super::jet`] makes one
 //! operation of all that a layer needs of them. burn's own `softplus` takes `exp(beta z)`, which overflows.
 
 use burn::tensor::Tensor;
+use burn::tensor::backend::Backend;
 
-use crate::backend::ModelBackend;
-use crate::jet::{Lanes, block, primitive, tensor};
+use super::lanes::block;
 
 /// An activation, applied to each element.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,48 +31,12 @@ pub enum Activation {
 
 impl Activation {
     /// `s(z)`.
-    pub fn value<B: ModelBackend>(self, z: Tensor<B, 2>) -> Tensor<B, 2> {
+    pub fn value<B: Backend>(self, z: Tensor<B, 2>) -> Tensor<B, 2> {
         self.composed(z).0
     }
 
-    /// `s(z + bias)` and `s'(z + bias)`.
-    ///
-    /// # Shapes
-    /// `z`: `[n, c]`; `bias`: `[1, c]`; results `[n, c]`.
-    pub fn value_and_slope<B: ModelBackend>(
-        self,
-        z: Tensor<B, 2>,
-        bias: Tensor<B, 2>,
-    ) -> (Tensor<B, 2>, Tensor<B, 2>) {
-        self.jet_and_slope(z, bias, Lanes::VALUE)
-    }
-
-    /// The value, tangents and Laplacian that leave the activation where `z` enters it, all stacked as in
-    /// [`crate::jet`].
-    ///
-    /// # Shapes
-    /// `z` and the result: `[blocks n, c]`; `bias`: `[1, c]`.
-    pub fn jet<B: ModelBackend>(
-        self,
-        z: Tensor<B, 2>,
-        bias: Tensor<B, 2>,
-        lanes: Lanes,
-    ) -> Tensor<B, 2> {
-        self.jet_and_slope(z, bias, lanes).0
-    }
-
-    fn jet_and_slope<B: ModelBackend>(
-        self,
-        z: Tensor<B, 2>,
-        bias: Tensor<B, 2>,
-        lanes: Lanes,
-    ) -> (Tensor<B, 2>, Tensor<B, 2>) {
-        let (out, slope) = B::activation_jet(primitive(z), primitive(bias), lanes, self);
-        (tensor(out), tensor(slope))
-    }
-
     /// Value and slope from ordinary tensor operations.
-    pub(crate) fn composed<B: ModelBackend>(self, z: Tensor<B, 2>) -> (Tensor<B, 2>, Tensor<B, 2>) {
+    pub(crate) fn composed<B: Backend>(self, z: Tensor<B, 2>) -> (Tensor<B, 2>, Tensor<B, 2>) {
         match self {
             Self::Softplus { beta } => softplus_and_slope(z, beta),
             Self::Sine { omega } => {
@@ -86,7 +50,7 @@ impl Activation {
     ///
     /// # Shapes
     /// `out`: `[blocks n, c]`; `slope` and the result: `[n, c]`.
-    pub(crate) fn curvature<B: ModelBackend>(
+    pub(crate) fn curvature<B: Backend>(
         self,
         out: &Tensor<B, 2>,
         slope: &Tensor<B, 2>,
@@ -98,7 +62,7 @@ impl Activation {
     }
 
     /// `s'''` from `s'` and `s''`, all `[n, c]`.
-    pub(crate) fn third<B: ModelBackend>(
+    pub(crate) fn third<B: Backend>(
         self,
         slope: Tensor<B, 2>,
         curvature: Tensor<B, 2>,
@@ -111,7 +75,7 @@ impl Activation {
 }
 
 /// The softplus and its slope with `e = exp(-|beta z|)` in `(0, 1]`.
-fn softplus_and_slope<B: ModelBackend>(z: Tensor<B, 2>, beta: f64) -> (Tensor<B, 2>, Tensor<B, 2>) {
+fn softplus_and_slope<B: Backend>(z: Tensor<B, 2>, beta: f64) -> (Tensor<B, 2>, Tensor<B, 2>) {
     let e = (z.clone().abs() * -beta).exp();
     let value = z.clone().clamp_min(0.0) + e.clone().log1p() / beta;
     // slope = 1 / (1 + e) right of zero and e / (1 + e) left of it. Divided, not multiplied by `recip`:
@@ -129,7 +93,7 @@ mod tests {
     const INPUTS: [f64; 7] = [-1.0e4, -3.0, -0.01, 0.0, 0.02, 2.5, 1.0e4];
 
     /// No bias.
-    fn none<B: ModelBackend>(columns: usize) -> Tensor<B, 2> {
+    fn none<B: Backend>(columns: usize) -> Tensor<B, 2> {
         Tensor::zeros([1, columns], &Default::default())
     }
 

@@ -10,8 +10,8 @@ use burn_autodiff::checkpoint::strategy::CheckpointStrategy;
 use burn_autodiff::grads::Gradients;
 use burn_autodiff::ops::{Backward, Ops, OpsKind};
 
-use crate::backend::ModelBackend;
-use crate::jet::{primitive, tensor};
+use super::backend::ModelBackend;
+use super::lanes::{primitive, tensor};
 
 /// `a b`.
 ///

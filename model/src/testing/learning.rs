@@ -1,4 +1,4 @@
-//! What the tests of the baselines share: spheres to learn, a short training, and the check that a term's
+//! What the tests of methods share: spheres to learn, a short training, and the check that a term's
 //! gradient is the slope of its values.
 
 use burn::module::{AutodiffModule, ModuleMapper, ModuleVisitor, Param};
@@ -6,13 +6,12 @@ use burn::optim::{AdamConfig, GradientsParams, Optimizer};
 use burn::tensor::Tensor;
 use burn::tensor::backend::Backend;
 
-use super::ends::{EndSamples, EndWeights};
-use crate::activation::Activation;
-use crate::backend::{ModelBackend, TrainBackend};
-use crate::implicit_net::ImplicitNetConfig;
-use crate::morph::Geometry;
+use super::{column, host, points};
+use crate::autodiff::{Activation, ModelBackend, TrainBackend};
+use crate::flow::end_terms::{EndSamples, EndWeights};
+use crate::flow::morph::Geometry;
+use crate::nets::ImplicitNetConfig;
 use crate::objective::Objective;
-use crate::testing::{column, host, points};
 
 /// A network small enough to be trained within a second, softplus of sharpness `beta`.
 pub fn small(beta: f64) -> ImplicitNetConfig {
@@ -34,7 +33,7 @@ pub fn small_siren(omega: f64) -> ImplicitNetConfig {
     }
 }
 
-/// All four terms.
+/// All five terms.
 pub fn end_weights() -> EndWeights {
     EndWeights {
         data: 1.0,

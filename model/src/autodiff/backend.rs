@@ -1,16 +1,12 @@
 //! What the mathematics asks of a backend beyond burn's own operations: matrix products, activations with
-//! all that passes through a layer beside the value ([`crate::jet`]), and how large its working set should be.
+//! all that passes through a layer beside the value ([`super::jet`]), and how large its working set should be.
 
 use burn::tensor::backend::{AutodiffBackend, Backend};
 use burn::tensor::ops::FloatTensor;
-use burn_autodiff::Autodiff;
-use burn_autodiff::checkpoint::strategy::CheckpointStrategy;
 
-use crate::activation::Activation;
-use crate::jet::{
-    self, Lanes, composed_jet, composed_jet_backward, composed_slope_backward, primitive, tensor,
-};
-use crate::product::tracked_product;
+use super::activation::Activation;
+use super::composed::{composed_jet, composed_jet_backward, composed_slope_backward};
+use super::lanes::{Lanes, primitive, tensor};
 
 /// A backend on which the networks can be evaluated.
 ///
@@ -80,24 +76,6 @@ pub trait ModelBackend: Backend {
 pub trait TrainBackend: ModelBackend + AutodiffBackend<InnerBackend: ModelBackend> {}
 
 impl<B> TrainBackend for B where B: ModelBackend + AutodiffBackend<InnerBackend: ModelBackend> {}
-
-/// The backward passes are the composed ones, tracked on this level.
-impl<B: ModelBackend, C: CheckpointStrategy> ModelBackend for Autodiff<B, C> {
-    const POINTS_AT_A_TIME: Option<usize> = B::POINTS_AT_A_TIME;
-
-    fn product(a: FloatTensor<Self>, b: FloatTensor<Self>) -> FloatTensor<Self> {
-        tracked_product::<B, C>(a, b)
-    }
-
-    fn activation_jet(
-        z: FloatTensor<Self>,
-        bias: FloatTensor<Self>,
-        lanes: Lanes,
-        activation: Activation,
-    ) -> (FloatTensor<Self>, FloatTensor<Self>) {
-        jet::tracked_jet::<B, C>(z, bias, lanes, activation)
-    }
-}
 
 #[cfg(feature = "wgpu")]
 impl ModelBackend for burn_wgpu::Wgpu {}

@@ -3,8 +3,9 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | this one | the formulas of [`crate::jet`] and of its backward passes, for any [`Pointwise`] activation |
+//! | this one | the formulas of [`super::jet`] and of its backward passes, for any [`Pointwise`] activation |
 //! | [`softplus`], [`sine`] | the functions themselves |
+//! | [`pointwise`] | what is common to both: the trait, and loops of vector instructions |
 //!
 //! burn-ndarray and burn-flex call the C library's `expf`, `log1pf`, `sinf` and `cosf` once per element, and
 //! take a pass over the memory for every sum and product of a formula. Here the functions are polynomials
@@ -12,65 +13,20 @@
 //! formula go over a piece that stays in the cache; [`pulp`] picks the widest instructions that the machine
 //! has. All runs on the calling thread: a step is divided between cores by its samples.
 
-use pulp::{Arch, NullaryFnOnce};
-
-use crate::activation::Activation;
-use crate::jet::{Lanes, SPATIAL};
-
-/// Elements of a piece: 8 kB of each operand, of which a formula has up to four.
-const PIECE: usize = 1 << 11;
-
-/// Adding it to a number of up to 2^22 rounds that to a whole one, whose bits are then the lowest of the
-/// sum; subtracting it again leaves the whole number.
-const ROUND: f32 = 12_582_912.0;
-
-/// A loop that is compiled once for each set of vector instructions, and for each function in `<>`; `arch`
-/// says which of the sets to take.
-///
-/// A closure would do, were the compiler bound to inline it: where it does not, all of it runs on the
-/// narrowest vectors.
-macro_rules! vectorised {
-    (
-        $(#[$doc:meta])*
-        fn $name:ident $(<$function:ident: $bound:path>)? ($($argument:ident: $type:ty),*) $body:block
-    ) => {
-        $(#[$doc])*
-        fn $name<'a $(, $function: $bound)?>(arch: Arch, $($argument: $type),*) {
-            struct Pass<'a $(, $function: $bound)?> {
-                $($argument: $type),*
-            }
-            impl<'a $(, $function: $bound)?> NullaryFnOnce for Pass<'a $(, $function)?> {
-                type Output = ();
-
-                #[inline(always)]
-                fn call(self) {
-                    let Self { $($argument),* } = self;
-                    $body
-                }
-            }
-            arch.dispatch(Pass { $($argument),* });
-        }
-    };
-}
-
+mod pointwise;
 mod sine;
 mod softplus;
 
-use sine::Sine;
-use softplus::Softplus;
+use pulp::{Arch, NullaryFnOnce};
 
-/// An activation whose second and third derivatives follow from its value and its slope.
-trait Pointwise: Copy {
-    /// Turns rows of inputs, which both hold, into values and slopes at the input plus the bias, of which
-    /// there is one per column.
-    fn evaluate(self, arch: Arch, bias: &[f32], value: &mut [f32], slope: &mut [f32]);
+use self::pointwise::{Pointwise, vectorised};
+use self::sine::Sine;
+use self::softplus::Softplus;
+use super::activation::Activation;
+use super::lanes::{Lanes, SPATIAL};
 
-    /// `s''`.
-    fn curvature(self, value: f32, slope: f32) -> f32;
-
-    /// `s'''`.
-    fn third(self, value: f32, slope: f32) -> f32;
-}
+/// Elements of a piece: 8 kB of each operand, of which a formula has up to four.
+const PIECE: usize = 1 << 11;
 
 /// A piece of what [`Pointwise::evaluate`] found.
 #[derive(Clone, Copy)]
