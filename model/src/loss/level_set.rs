@@ -10,8 +10,8 @@
 //!
 //! # Differs from the paper
 //! The paper prints `lambda_l = 10`. On an exact moving distance field `d|grad f|/dt` along the flow
-//! vanishes for `lambda_l = 1` and for no other value (derived, and checked in this file's tests on the
-//! expanding sphere), so 1 is the default.
+//! vanishes for `lambda_l = 1` and for no other value, so 1 is the default. `loss/tests/values.rs` checks that
+//! on the expanding sphere.
 
 use burn::tensor::Tensor;
 use burn::tensor::backend::Backend;

@@ -20,6 +20,6 @@ pub fn smoothness<B: Backend>(v: &VelocityJet<B>, alpha: f64, gamma: f64) -> Ten
     let laplacian = v
         .laplacian
         .clone()
-        .expect("the smoothness term asks for the Laplacian");
+        .expect("the smoothness term needs the Laplacian of the jet");
     length(still - laplacian * alpha).mean()
 }

@@ -44,9 +44,9 @@ pub struct VelocityJet<B: Backend> {
     pub value: Tensor<B, 2>,
     /// `J[i, k] = dV_i / dx_k`, `[n, 3, 3]`.
     pub jacobian: Tensor<B, 3>,
-    /// The Laplacian of each component, `[n, 3]`, where it was asked for.
+    /// The Laplacian of each component, `[n, 3]`, where it was requested.
     pub laplacian: Option<Tensor<B, 2>>,
-    /// `dV/dt`, `[n, 3]`, where it was asked for; zero for a stationary field.
+    /// `dV/dt`, `[n, 3]`, where it was requested; zero for a stationary field.
     pub rate: Option<Tensor<B, 2>>,
 }
 
@@ -88,6 +88,6 @@ impl<B: Backend> VelocityJet<B> {
 pub struct VelocityRequest {
     /// The Laplacian: the smoothness term.
     pub laplacian: bool,
-    /// `dV/dt`: the steadiness term.
+    /// `dV/dt`: the screw term.
     pub rate: bool,
 }

@@ -207,19 +207,7 @@ fn terms<B: TrainBackend>() -> Vec<(&'static str, bool, bool, fn(&Scene<B>) -> T
         ("strain of a scale", false, true, |s| {
             strain::strain(&s.v_jet(), 0.3)
         }),
-        ("deviatoric", false, true, |s| {
-            deviatoric::deviatoric(&s.v_jet())
-        }),
-        ("stretch", false, true, |s| {
-            stretch::stretch(&s.v_jet(), points(&[[0.0, 0.6, 0.8]; 3]))
-        }),
         ("screw", false, true, |s| screw::screw(&s.v_jet())),
-        ("acceleration", false, true, |s| {
-            acceleration::acceleration(&s.v_jet())
-        }),
-        ("steadiness", false, true, |s| {
-            steadiness::steadiness(&s.v_jet())
-        }),
         ("distance", true, false, |s| {
             distance::distance(s.f_jet().value, column(&[0.4, -0.3, 0.2]))
         }),
