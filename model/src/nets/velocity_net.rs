@@ -4,9 +4,14 @@
 //! to zero, so that training starts from the identity.
 //!
 //! # Differs from the paper
-//! The paper does not say whether V depends on time. A stationary field is the default: its flow holds
-//! every rotation exactly, and it cannot wander between the ends (`shared/probes/prototype.md`). Time
-//! enters at half scale, which the same probes found the easier to discipline.
+//! The paper does not say whether V depends on time; here that is a setting.
+//!
+//! A stationary field holds every rotation exactly, and is determined between the ends by what it is elsewhere.
+//! It cannot move two limbs through one place in different directions. A field of time can, but nothing holds
+//! it between the ends, so it needs a regulariser ([`crate::loss::screw`]).
+//!
+//! Time enters at half scale, as a coordinate between -1/2 and 1/2 like those of the points: the first weights
+//! then make V vary with time about as fast as with the position, and not twice as fast.
 
 use burn::module::Module;
 use burn::tensor::Tensor;
