@@ -2,8 +2,8 @@
 //! explicit velocity field `V`, their derivatives, and the objective that trains them together.
 //!
 //! The method is that of "Implicit Neural Surface Deformation with Explicit Velocity Fields"
-//! (ICLR 2025), called *the paper* below. This crate knows burn; it knows no file, no clock and no
-//! terminal.
+//! (ICLR 2025), called *the paper* below. This crate uses burn. It reads no file and no clock, and writes
+//! to no terminal.
 //!
 //! | paper | here | shape |
 //! |---|---|---|
@@ -17,12 +17,23 @@
 //! | `f(x, t)` of two end fields carried by `V` | [`FlowGeometry`] | `[n, 1]` |
 //! | `gamma(x)`, positional encoding | [`nets::encoding::encode`] | `[n, 3 (2 m + 1)]` |
 //! | `L_f`, `L_v`, `L_m` | one file per term in [`loss`], summed by [`Objective`] | `[1]` |
-//! | the methods compared with | one file each in [`baseline`], seen as [`Geometry`] or [`Motion`] | |
+//! | the methods compared with | one file each in [`baseline`], each a [`Geometry`] or a [`Motion`] | |
 //!
 //! Networks, operators and terms are generic over the burn backend. A training backend is
 //! `Autodiff<Inner>`; derivatives by the input lift it by one or two further levels of autodiff
 //! ([`operators::Derivatives::Nested`]) or run one sweep of ordinary operations
 //! ([`operators::Derivatives::Forward`]).
+//!
+//! Each folder uses those above it in this table and none below:
+//!
+//! | folder | what |
+//! |---|---|
+//! | [`autodiff`] | products, activations and their kernels, differentiable at every level |
+//! | [`nets`] | the two networks |
+//! | [`operators`] | their derivatives by the inputs |
+//! | [`loss`] | the terms of the objective |
+//! | [`flow`] | the default method: end fields, trajectories, and the geometry that both make |
+//! | [`baseline`] | the methods compared with |
 
 // The thrice lifted autodiff types nest deeper than the default limit allows.
 #![recursion_limit = "256"]

@@ -1,4 +1,4 @@
-//! What the mathematics asks of a backend beyond burn's own operations: matrix products, activations with
+//! What the mathematics needs of a backend beyond burn's own operations: matrix products, activations with
 //! all that passes through a layer beside the value ([`super::jet`]), and how large its working set should be.
 
 use burn::tensor::backend::{AutodiffBackend, Backend};

@@ -23,12 +23,14 @@ pub(crate) fn composed_jet<B: Backend>(
 ) -> (Tensor<B, 2>, Tensor<B, 2>) {
     let n = z.dims()[0] / lanes.blocks();
     let (value, slope) = activation.composed(block(&z, 0, n) + bias);
+    // Nothing to stack. A copy of the value would be one more node on every level of autodiff.
     if lanes == Lanes::VALUE {
         return (value, slope);
     }
     let mut blocks = vec![value];
     for k in 1..lanes.blocks() {
         let passed = block(&z, k, n) * slope.clone();
+        // The Laplacian is the last block, so the curvature is evaluated once at most.
         blocks.push(if k > lanes.tangents {
             passed + squares(&z, n) * activation.curvature(&blocks[0], &slope)
         } else {
@@ -48,17 +50,21 @@ pub(crate) fn composed_jet_backward<B: Backend>(
     lanes: Lanes,
     activation: Activation,
 ) -> Tensor<B, 2> {
+    // Alone, the value needs its slope only, and what entered was not kept.
     let Some(z) = z else { return grad * slope };
     let n = slope.dims()[0];
     let curvature = activation.curvature(out, &slope);
     let mut blocks: Vec<_> = (0..lanes.blocks())
         .map(|k| block(&grad, k, n) * slope.clone())
         .collect();
+    // Every lane was multiplied by the slope at `z_0`, and so changes with `z_0` by the curvature.
     for k in 1..lanes.blocks() {
         let through = block(&z, k, n) * block(&grad, k, n) * curvature.clone();
         blocks[0] = blocks[0].clone() + through;
     }
     if lanes.laplacian {
+        // The Laplacian holds `s'' |grad z|^2` as well: it changes with `z_0` by the third derivative, and with
+        // each tangent of space. The tangent of time is no part of it.
         let by_laplacian = block(&grad, lanes.tangents + 1, n);
         let third = activation.third(slope, curvature.clone());
         blocks[0] = blocks[0].clone() + squares(&z, n) * by_laplacian.clone() * third;

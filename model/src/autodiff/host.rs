@@ -28,6 +28,7 @@ trait HostBackend: ModelBackend {
 
     /// A tensor of these elements.
     fn from_rows(elements: Vec<f32>, shape: [usize; 2]) -> FloatTensor<Self> {
+        // The memory of the host is the only device of these backends.
         Self::float_from_data(TensorData::new(elements, shape), &Default::default())
     }
 }
@@ -73,6 +74,7 @@ fn jet_backward<B: HostBackend>(
     };
     let by_z = match &z {
         Some(z) => B::read(z, with_z),
+        // Without lanes the kernel reads nothing of what entered.
         None => with_z(&[]),
     };
     B::from_rows(by_z, B::shape(&grad))

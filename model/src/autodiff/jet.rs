@@ -102,6 +102,7 @@ impl<B: ModelBackend> Backward<B, 2> for JetBackward {
         let by_z = B::activation_jet_backward(z, out, slope, grad, lanes, activation);
         let [z, bias] = ops.parents;
         if let Some(bias) = bias {
+            // The bias entered every row of the value and nothing else.
             let by_bias = block(&tensor::<B>(by_z.clone()), 0, n).sum_dim(0);
             grads.register::<B>(bias.id, primitive(by_bias));
         }
@@ -153,9 +154,12 @@ pub(crate) fn tracked_jet<B: ModelBackend, C: CheckpointStrategy>(
     lanes: Lanes,
     activation: Activation,
 ) -> Pair<Autodiff<B, C>> {
+    // Kept until the backward pass, so only where that reads it: it is as large as all of the lanes.
     let entered = (lanes != Lanes::VALUE).then(|| z.primitive.clone());
     let (out, slope) = B::activation_jet(z.primitive, bias.primitive, lanes, activation);
     let nodes = [z.node, bias.node];
+    // A node of burn's graph has one result. The two results become two nodes over the same operands; both are
+    // evaluated here, once.
     let passed = |z| Passed {
         z,
         out: out.clone(),
@@ -164,6 +168,7 @@ pub(crate) fn tracked_jet<B: ModelBackend, C: CheckpointStrategy>(
         activation,
     };
     let prepared = Backward::<B, 2>::prepare::<C>(JetBackward, nodes.clone());
+    // Compute bound: a checkpointing strategy then keeps the result instead of evaluating it again.
     let tracked_out = match prepared.compute_bound().stateful() {
         OpsKind::Tracked(step) => step.finish(passed(entered), out.clone()),
         OpsKind::UnTracked(step) => step.finish(out.clone()),

@@ -1,9 +1,9 @@
-//! Where the machine is spoken to in its own words: the one file of this workspace with `unsafe`.
+//! What needs the machine itself: the one file of this workspace with `unsafe`.
 //!
 //! | what | why | what it saves |
 //! |---|---|---|
 //! | [`product`] | the `gemm` crate has an interface of pointers only | burn-ndarray's own products run at a quarter of its rate |
-//! | [`without_denormals`] | a register of the processor says what becomes of numbers below 1e-38 | a fifth of a step at 8 layers, four fifths at 12 |
+//! | [`without_denormals`] | a register of the processor decides what becomes of numbers below 1e-38 | a fifth of a step at 8 layers, four fifths at 12 |
 //!
 //! `model/benches/README.md` has the measurements.
 #![allow(unsafe_code)]

@@ -56,6 +56,7 @@ pub(crate) fn tracked_product<B: ModelBackend, C: CheckpointStrategy>(
     let prepared = Backward::<B, 2>::prepare::<C>(ProductBackward, nodes);
     match prepared.compute_bound().stateful() {
         OpsKind::Tracked(step) => {
+            // The gradient of one factor needs the other. A factor beside a constant is not kept.
             let [tracks_a, tracks_b] = [&a, &b].map(|factor| !factor.node.requirement.is_none());
             let state = (
                 tracks_b.then(|| a.primitive.clone()),

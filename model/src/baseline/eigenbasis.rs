@@ -156,6 +156,7 @@ impl<B: ModelBackend> Eigenbasis<B> {
             let angle = (along - self.lower[axis]) / self.size[axis] * waves.clone();
             (angle.clone().sin(), angle.cos())
         });
+        // A mode is a product over the axes: three waves per frequency and axis give all `modes^3` of them.
         let [(s1, c1), (s2, c2), (s3, c3)] = axes;
         let first = products(c1, products(s2.clone(), s3.clone()));
         let second = products(s1.clone(), products(c2, s3));
@@ -173,6 +174,8 @@ impl<B: ModelBackend> Eigenbasis<B> {
             let scaled = z.clone() * factor;
             [0, 1, 2].map(|j| scaled.clone().slice([0..count, j..j + 1]))
         });
+        // The curl is linear in `z`: written as a matrix, it makes `V` one product, and it is built once for all
+        // steps of a trajectory.
         let zero = Tensor::zeros([count, 1], &z.device());
         // V = (d2 A3 - d3 A2, d3 A1 - d1 A3, d1 A2 - d2 A1).
         let [_, d1_a2, d1_a3] = d1;

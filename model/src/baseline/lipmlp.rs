@@ -8,7 +8,7 @@
 //!
 //! each layer, the last included, with a `c` of its own (columns are the source's rows: inputs stand on the
 //! left here). In the maximum norm no layer stretches by more than its `softplus(c)`, nor does `f` by more
-//! than their product, and that product is punished:
+//! than their product, and that product is a term of the objective:
 //!
 //! ```text
 //! distances   mean (f - d)^2 at t = 0, 1, on the surfaces (d = 0) and in space     weight 1

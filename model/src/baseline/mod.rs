@@ -5,7 +5,7 @@
 //! | [`linear`] | straight lines between corresponding points | | points |
 //! | [`mlp`] | `f(x, t)` fitted at t = 0, 1 and nowhere else | the paper, Section 5 | surface |
 //! | [`blend`] | `(1 - t) g + t h` of the two distance fields | Payne and Toga 1992 | surface |
-//! | [`lipmlp`] | `f(x, t)` whose slope in time is bounded and punished | Liu et al. 2022 | surface |
+//! | [`lipmlp`] | `f(x, t)` with a trained, regularised bound on its slope in time | Liu et al. 2022 | surface |
 //! | [`nise`] | `f(x, t)` under a level-set equation between `g` and `h` | Novello et al. 2023 | surface |
 //! | [`nfgp`] | an invertible deformation that keeps lengths and curvature | Yang et al. 2021 | points |
 //! | [`eigenbasis`] | the flow of a divergence-free field in a sine basis | Eisenberger et al. 2019 | points |

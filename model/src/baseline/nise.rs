@@ -65,6 +65,9 @@ pub struct NiseConfig {
 
 impl NiseConfig {
     /// A network that starts as a sphere, between two fitted ends.
+    ///
+    /// # Panics
+    /// If the network has more than 10,000 parameter tensors, two to a layer.
     pub fn init<B: ModelBackend>(
         &self,
         ends: EndFields<B>,
@@ -102,7 +105,7 @@ impl Default for NiseWeights {
     }
 }
 
-/// Random positions and times, where the level-set equation is asked for.
+/// Random positions and times, where the level-set equation is sampled.
 #[derive(Clone, Debug)]
 pub struct BetweenSamples<B: Backend> {
     /// In the box and near both surfaces, `[n, 3]`.
@@ -123,7 +126,7 @@ pub struct Nise<B: Backend> {
 impl<B: ModelBackend> Nise<B> {
     /// The terms "data", "normals" and "level-set".
     ///
-    /// Of the samples at the ends the points and their times are read; the values and normals wanted there
+    /// Of the samples at the ends the points and their times are read; the values and normals to be reached there
     /// are those of `g` and `h`.
     pub fn objective(
         &self,

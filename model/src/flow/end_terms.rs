@@ -47,7 +47,7 @@ impl<B: Backend> EndSamples<B> {
             let (points, times) = (points.dims(), times.dims());
             assert!(
                 points[1] == 3 && times == [points[0], 1],
-                "points {points:?} and their times {times:?}: [n, 3] and [n, 1] wanted"
+                "points {points:?} and their times {times:?}: [n, 3] and [n, 1] needed"
             );
         }
         let points = vec![self.surface.clone(), self.space.clone()];
@@ -88,9 +88,10 @@ impl<B: Backend> Seen<'_, B> {
     }
 }
 
-/// The shared terms. Where the ends are seen apart, each term is the mean of theirs.
+/// The shared terms. Where the two ends have a field each, each term is the mean of theirs.
 pub(crate) fn objective<B: Backend>(ends: &[Seen<B>], weights: &EndWeights) -> Objective<B> {
     let mean = |term: &dyn Fn(&Seen<B>) -> Tensor<B, 1>| {
+        // A mean of means: each end counts alike, however many samples it has.
         Tensor::cat(ends.iter().map(term).collect(), 0).mean()
     };
     let mut objective = Objective::new();

@@ -1,13 +1,13 @@
-//! Geometry defined by the flow: two end fields that the velocity field carries to the time asked for,
+//! Geometry defined by the flow: two end fields that the velocity field carries to the time of interest,
 //!
 //! ```text
 //! f(x, t) = (1 - t) g(phi_{t -> 0}(x)) + t h(phi_{t -> 1}(x))
 //! ```
 //!
 //! where `phi_{t -> s}(x)` is where a point that is at `x` at time `t` is at time `s`. Both carried fields
-//! solve the level-set equation `f_t + V.grad f = 0` by construction, so only the ends are fitted, and all
-//! that is learnt of the shapes stays sharp in between; where the flow takes the source exactly onto the
-//! target the two are one surface, and `f_t + V.grad f = h - g` says by how much they are not.
+//! solve the level-set equation `f_t + V.grad f = 0` by construction. So only the ends are fitted, and all
+//! that is learnt of the shapes stays sharp in between. Where the flow takes the source exactly onto the
+//! target the two are one surface. Elsewhere `f_t + V.grad f = h - g` is the difference of the two.
 //!
 //! `g` and `h` are the [`EndFields`]; without a velocity this is their linear blend.
 //!
@@ -78,6 +78,7 @@ impl<B: ModelBackend> FlowGeometry<B> {
 
     /// The share of the steps that the longest of the spans from `t` to each end has.
     fn shares(&self, t: &Tensor<B, 2>) -> [Steps; 2] {
+        // All points are followed together, so the longest span decides for all.
         let times = t.clone().into_data();
         let [least, most] = times
             .iter::<f64>()
@@ -115,6 +116,7 @@ impl<B: ModelBackend> Geometry<B> for FlowGeometry<B> {
     /// The gradient of each end field where the point comes from, carried back along with it.
     fn gradient(&self, x: Tensor<B, 2>, t: Tensor<B, 2>) -> Tensor<B, 2> {
         let gradient = |net, end: f64, steps: Steps| {
+            // Exact up to the integration: differences would divide the error of two integrations by a small step.
             let from = t.full_like(end);
             let there = self.carry(x.clone(), t.clone(), end, steps);
             let jet = reverse::implicit_jet(net, there.clone(), t.zeros_like());
@@ -165,6 +167,7 @@ fn needed<B: ModelBackend>(
     let rhs = |x, t| velocity.forward(x, t);
     let mut most = 1;
     for (net, start) in [(ends.source(), 0.0), (ends.target(), 1.0)] {
+        // Away from both surfaces an error of the position moves no surface.
         let distance = net.forward(probes.clone(), zeros.clone()).abs();
         let near = distance.lower_elem(NEAR).squeeze_dim::<1>(1).argwhere();
         let near = near.reshape([-1]);

@@ -20,7 +20,7 @@ pub trait Geometry<B: ModelBackend>: Sync {
     /// `x`: `[n, 3]`, normalised; `t`: `[n, 1]`, in `[0, 1]`; result `[n, 1]`.
     fn value(&self, x: Tensor<B, 2>, t: Tensor<B, 2>) -> Tensor<B, 2>;
 
-    /// `grad f` by the position, `[n, 3]`: central differences where the method knows nothing better.
+    /// `grad f` by the position, `[n, 3]`: central differences, unless the method has a better way.
     fn gradient(&self, x: Tensor<B, 2>, t: Tensor<B, 2>) -> Tensor<B, 2> {
         let along = |axis: usize| {
             let mut step = [0.0; 3];
@@ -40,7 +40,7 @@ pub trait Geometry<B: ModelBackend>: Sync {
 }
 
 /// A surface that a flow carries: `f(x, t)` is known from the positions at times 0 and 1 of what is at `x`
-/// at `t`. These vary more smoothly than `f` does, so they can be interpolated where many values are wanted.
+/// at `t`. These vary more smoothly than `f` does, so they can be interpolated where many values are needed.
 pub trait Carried<B: ModelBackend>: Sync {
     /// How far off the true positions may be, in normalised units, for all but one in twenty near the
     /// surface.
@@ -59,7 +59,7 @@ pub trait Motion<B: ModelBackend>: Sync {
     fn carry(&self, x: Tensor<B, 2>, from: f64, to: f64) -> Tensor<B, 2>;
 
     /// Where points that are at `x` at time 0 are at each of `times`, which ascend: from each time to the
-    /// next, unless the method knows better.
+    /// next, unless the method has a better way.
     fn path(&self, x: Tensor<B, 2>, times: &[f64]) -> Vec<Tensor<B, 2>> {
         let (mut now, mut at) = (x, 0.0);
         let step = |time: &f64| {
@@ -84,6 +84,7 @@ pub(crate) fn follow<B: ModelBackend>(
     from: f64,
     to: f64,
 ) -> Tensor<B, 2> {
+    // The steps follow the span: a way in pieces is as exact as the same way at once.
     let steps = Steps::Even(((to - from).abs() * STEPS_PER_TIME).ceil().max(1.0) as usize);
     let full = |time: f64| Tensor::full([x.dims()[0], 1], time, &x.device());
     let (from, to) = (full(from), full(to));

@@ -67,6 +67,7 @@ pub fn integrate<B: Backend>(
         let h = match steps {
             Steps::Even(_) => even.clone(),
             Steps::Grid(count) => {
+                // Beyond its end time a sample takes steps of length 0, whichever way it goes.
                 (to.clone() - t.clone()).clamp(-1.0 / count as f64, 1.0 / count as f64)
             }
         };
@@ -102,6 +103,7 @@ pub fn steps_within<B: Backend>(
         if 20 * within >= 19 * off.num_elements() {
             return count;
         }
+        // What was fine is the coarse one of the next comparison: each number of steps is taken once.
         (count, coarse) = (2 * count, fine);
     }
     most

@@ -52,6 +52,7 @@ pub fn transport_gradient<B: ModelBackend>(
         let (velocity, pulled) = operators.pulled_back(net, x, t, gradient);
         Tensor::cat(vec![velocity, -pulled], 1)
     };
+    // One state, so that every stage of the integrator evaluates `V` and the product at the same points.
     let state = Tensor::cat(vec![x, gradient], 1);
     let state = integrate(rhs, state, from, to, steps, integrator);
     let gradient = state.clone().slice([0..count, 3..6]);
@@ -89,7 +90,7 @@ mod tests {
             _: Tensor<B, 2>,
             _: Tensor<B, 2>,
         ) -> ImplicitJet<B> {
-            unreachable!("the transport of normals does not ask for f")
+            unreachable!("the transport of normals does not need f")
         }
 
         fn velocity_jet<B: ModelBackend>(
@@ -99,7 +100,7 @@ mod tests {
             _: Tensor<B, 2>,
             _: VelocityRequest,
         ) -> VelocityJet<B> {
-            unreachable!("the transport of normals asks for one product only")
+            unreachable!("the transport of normals needs one product only")
         }
 
         fn pulled_back<B: ModelBackend>(

@@ -36,6 +36,7 @@ pub fn level_set_residual<B: Backend>(
     lambda_l: f64,
 ) -> Tensor<B, 2> {
     let carried = material_derivative(f, v);
+    // `R` divides by `|grad f|` and takes a product with `J`: not needed for the OLSE.
     if lambda_l == 0.0 {
         return carried;
     }

@@ -21,7 +21,7 @@ use crate::operators::VelocityJet;
 /// The mean of `|V_t + D V|^2`.
 ///
 /// # Panics
-/// If the jet was asked for without its rate.
+/// If the jet has no rate.
 pub fn screw<B: Backend>(v: &VelocityJet<B>) -> Tensor<B, 1> {
     let rate = v
         .rate

@@ -104,6 +104,7 @@ impl ImplicitNetConfig {
             .zip(values)
             .map(|(radius, f)| radius - self.sphere_radius - f)
             .collect();
+        // `f` is linear in the output layer, so the best one is found without iterating on the network.
         let change = initial::ridge(&read(hidden), &missing);
         if let Some(output) = layers.last_mut() {
             let weights = output.weight.iter_mut().chain(output.bias.iter_mut());

@@ -36,6 +36,7 @@ pub(crate) fn sine(
     layers
         .map(|(k, (inputs, outputs))| {
             let later = (6.0 / inputs as f64).sqrt() / omega;
+            // The first layer spreads angles over a few periods; later ones keep the spread of their inputs.
             let limit = match k {
                 0 => 1.0 / inputs as f64,
                 k if k == depth => later * output_scale,
@@ -76,6 +77,7 @@ pub(crate) fn sphere(
             // The rows of the network's input: all of them in the first layer, the last at a skip.
             let first = if k == 0 { 0 } else { config.width };
             for (row, values) in weight.chunks_mut(outputs).enumerate().skip(first) {
+                // A wave or a time with a weight of its own would bend the sphere from the start.
                 let factor = if row < first + 3 {
                     1.0 / encoding_scale
                 } else {
@@ -111,6 +113,8 @@ pub(crate) fn ridge(hidden: &[f64], missing: &[f64]) -> Vec<f64> {
                 .for_each(|(m, other)| *m += feature * other / n as f64);
         }
     }
+    // Features of neighbouring units are nearly alike, and without the ridge their weights could grow without
+    // bound.
     let trace: f64 = (0..columns).map(|i| matrix[i * columns + i]).sum();
     (0..columns).for_each(|i| matrix[i * columns + i] += RIDGE * trace / columns as f64);
     conjugate_gradients(&matrix, &right, 4 * columns)

@@ -115,7 +115,9 @@ impl MlpConfig {
             .iter()
             .map(|layer| (layer.inputs, layer.outputs))
             .collect();
-        assert_eq!(sizes, given, "layer sizes wanted and given");
+        assert_eq!(sizes, given, "layer sizes of the shape, and those given");
+        // Initialised at once: a parameter of burn that was never read draws its weights when it is cloned, and the
+        // clone would be another network.
         let parameter = |id: usize, values: &[f32], shape: [usize; 2]| {
             let tensor = Tensor::from_data(TensorData::new(values.to_vec(), shape), device);
             // Numbered, so that a checkpoint depends on nothing but the seed.
@@ -166,6 +168,7 @@ impl<B: ModelBackend> Mlp<B> {
         input: &Tensor<B, 2>,
     ) -> Tensor<B, 2> {
         if self.skips_at(k) {
+            // Divided so that what the layer reads does not grow by what is put beside it.
             Tensor::cat(vec![hidden, input.clone()], 1) / 2f64.sqrt()
         } else {
             hidden

@@ -98,7 +98,7 @@ impl<B: ModelBackend> VelocityNet<B> {
     pub(crate) fn features(&self, x: Tensor<B, 2>, t: Tensor<B, 2>) -> Tensor<B, 2> {
         let encoded = encode(x, self.frequencies);
         if self.time_dependent {
-            // (2 t - 1) / 2: the module documentation says why at half scale.
+            // (2 t - 1) / 2: the reason for half of the scale is in this file's head.
             Tensor::cat(vec![encoded, t - 0.5], 1)
         } else {
             encoded

@@ -83,7 +83,7 @@ impl<B: Backend> VelocityJet<B> {
     }
 }
 
-/// Which of the dearer derivatives of `V` are wanted.
+/// Which of the dearer derivatives of `V` a jet has.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct VelocityRequest {
     /// The Laplacian: the smoothness term.

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | [`nested`] | repeated autodiff: the network is lifted onto further levels of autodiff and differentiated there |
 //! | [`forward`] | one sweep of ordinary operations that carries value, tangents and Laplacian through `V` |
-//! | [`reverse`] | one written-out reverse sweep, for `grad f` and `J^T w`, where one output direction is wanted |
+//! | [`reverse`] | one written-out reverse sweep, for `grad f` and `J^T w`, for one direction of the output |
 //!
 //! Both ways stand behind one trait, [`Operators`], and must agree to f32 rounding. Naming: a *jet* is a
 //! value together with its derivatives at the same points ([`jets`]).

@@ -1,5 +1,6 @@
 //! What the tests of this crate share: the backends they run on, and the way in and out of tensors.
 
+mod folders;
 pub mod learning;
 
 use burn::module::{Module, ModuleMapper, Param};

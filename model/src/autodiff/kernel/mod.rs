@@ -99,6 +99,7 @@ fn jet_of<F: Pointwise>(
     // Whole rows, so that a piece begins where the bias does.
     let piece = (PIECE / bias.len()).max(1) * bias.len();
     for z in z[..size].chunks(piece) {
+        // Both begin as what entered, and are evaluated in place.
         let (value, slope) = (append(&mut out, z).1, append(&mut slope, z).1);
         function.evaluate(arch, bias, value, slope);
     }
@@ -108,6 +109,7 @@ fn jet_of<F: Pointwise>(
             let slope = &slope[from..to];
             let (before, out) = append(&mut out, block(k, from, to));
             multiply(arch, out, slope);
+            // The Laplacian alone also takes the squares of the three tangents of space.
             if k > lanes.tangents {
                 let value = &before[from..to];
                 let at = Evaluated { value, slope };
@@ -139,6 +141,7 @@ fn jet_backward_of<F: Pointwise>(
             let at = Evaluated { value, slope };
             let z = |k: usize| &z[k * size + from..k * size + to];
             let g = |k: usize| &grad[k * size + from..k * size + to];
+            // The blocks are made in their order, so the result grows and is never filled with zeros.
             let (_, out) = append(&mut out, g(k));
             multiply(arch, out, slope);
             if k == 0 {

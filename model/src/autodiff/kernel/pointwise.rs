@@ -7,7 +7,7 @@ use pulp::Arch;
 pub(super) const ROUND: f32 = 12_582_912.0;
 
 /// A loop that is compiled once for each set of vector instructions, and for each function in `<>`; `arch`
-/// says which of the sets to take.
+/// is the set to take.
 ///
 /// A closure would do, were the compiler bound to inline it: where it does not, all of it runs on the
 /// narrowest vectors.

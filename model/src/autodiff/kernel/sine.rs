@@ -5,7 +5,7 @@
 //! omega z = k pi/2 + r   with a whole k and |r| <= pi/4
 //! ```
 //!
-//! The sine and the cosine of `r` are polynomials, and `k` modulo 4 says which of the two is which, with
+//! The sine and the cosine of `r` are polynomials, and `k` modulo 4 decides which of the two is which, with
 //! which sign. `r` is found by Cody and Waite's reduction ("Software Manual for the Elementary Functions",
 //! 1980): `pi/2` in three parts, the first two with so few digits that their products with `k`, and the
 //! differences from these, are exact. An angle beyond [`FAR`] goes through the C library in float64.

@@ -101,6 +101,7 @@ impl<B: ModelBackend> Block<B> {
         let m = config.frequencies as f64;
         let layers = self.layers.iter().map(|layer| {
             let weight = layer.weight.val();
+            // A layer that keeps to its bound by itself is left as it is.
             let norm = spectral_bound(weight.clone()).clamp_min(1.0);
             (weight / norm, layer.bias.val())
         });
@@ -313,6 +314,7 @@ impl<B: ModelBackend> Normalised<B> {
         let axis = |k: usize| {
             let mut unit = [0.0; 3];
             unit[k] = 1.0;
+            // `repeat_dim`, whose backward is wrong in burn 0.21, does no harm to constants.
             Tensor::<B, 1>::from_floats(unit, &x.device())
                 .reshape([1, 3])
                 .repeat_dim(0, n)

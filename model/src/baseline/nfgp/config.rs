@@ -60,7 +60,7 @@ impl NfgpConfig {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FixedPoint {
     /// How far from the block's exact inverse a point may be, in normalised units, above 0. Steps shrink
-    /// by `bound`, so one of length `tolerance (1 - bound) / bound` tells that this is reached; f32 allows about
+    /// by `bound`, so one of length `tolerance (1 - bound) / bound` means that this is reached; f32 allows about
     /// 1e-6.
     pub tolerance: f64,
     /// Iterations per block after which it ends in any case.

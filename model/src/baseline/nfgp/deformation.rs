@@ -71,6 +71,7 @@ impl<B: ModelBackend> Nfgp<B> {
     /// `[n, 3]` to `[n, 3, 3]`.
     pub fn jacobian(&self, x: Tensor<B, 2>) -> Tensor<B, 3> {
         let n = x.dims()[0];
+        // One sweep carries the three tangents, on layers that are normalised once.
         let (_, columns) = self.normalised().jet_by_axes(x);
         Tensor::cat(columns.map(|column| column.reshape([n, 3, 1])).into(), 2)
     }
