@@ -10,8 +10,8 @@ use std::fmt;
 use burn::tensor::Tensor;
 use divan::Bencher;
 use divan::counter::ItemsCount;
-use isomorph_model::activation::Activation;
-use isomorph_model::jet::Lanes;
+use isomorph_model::autodiff::Activation;
+use isomorph_model::autodiff::Lanes;
 use isomorph_model::{ModelBackend, TrainBackend, product};
 
 use backends::{numbers, on_each_backend};

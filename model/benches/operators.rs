@@ -17,7 +17,7 @@ use burn::tensor::Tensor;
 use burn::tensor::backend::Backend;
 use divan::Bencher;
 use divan::counter::ItemsCount;
-use isomorph_model::activation::Activation;
+use isomorph_model::autodiff::Activation;
 use isomorph_model::operators::{Derivatives, Operators, VelocityRequest};
 use isomorph_model::{
     ImplicitNet, ImplicitNetConfig, ModelBackend, TrainBackend, VelocityNet, VelocityNetConfig,

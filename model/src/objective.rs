@@ -1,4 +1,4 @@
-//! The objective: a weighted sum of terms, each known by its name.
+//! The objective: a weighted sum of terms, each of which has a name.
 //!
 //! `L = lambda_f L_f + lambda_v L_v + lambda_m L_m` in the paper (Eq. "total loss"); here every part
 //! carries its own weight, so that all of them can be read, logged and tested one by one.
@@ -59,6 +59,7 @@ impl<B: Backend> Objective<B> {
         if self.terms.is_empty() {
             return Vec::new();
         }
+        // One transfer for all of them: each transfer waits until the device is done.
         let values = self
             .terms
             .iter()

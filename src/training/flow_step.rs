@@ -12,8 +12,8 @@
 
 use burn::module::Module;
 use burn::tensor::Tensor;
-use isomorph_model::baseline::blend::SdfBlend;
-use isomorph_model::baseline::ends::EndSamples;
+use isomorph_model::flow::end_fields::EndFields;
+use isomorph_model::flow::end_terms::EndSamples;
 use isomorph_model::loss::data;
 use isomorph_model::{ImplicitNet, Objective, TrainBackend};
 
@@ -33,7 +33,7 @@ pub struct FlowStep<'a, B: TrainBackend> {
     /// The share of the weight of the term that takes each surface onto the other.
     pub ramp: f64,
     /// The end fields.
-    pub ends: &'a SdfBlend<B>,
+    pub ends: &'a EndFields<B>,
 }
 
 impl<B: TrainBackend> FlowStep<'_, B> {

@@ -3,10 +3,9 @@
 
 use burn::module::AutodiffModule;
 use burn::tensor::Tensor;
-use isomorph_model::loss::{
-    acceleration, deviatoric, divergence, matching, screw, smoothness, steadiness, strain, stretch,
-};
-use isomorph_model::operators::{Operators, VelocityJet, VelocityRequest, transport};
+use isomorph_model::loss::{divergence, matching, screw, smoothness, strain};
+use isomorph_model::flow::transport::transport;
+use isomorph_model::operators::{Operators, VelocityJet, VelocityRequest};
 use isomorph_model::trajectory::integrate;
 use isomorph_model::{Objective, TrainBackend, VelocityNet};
 
@@ -171,9 +170,6 @@ impl<B: TrainBackend> Motion<'_, B> {
         objective.add("divergence", loss.divergence, || {
             divergence::divergence(&jet)
         });
-        objective.add("steadiness", loss.steadiness, || {
-            steadiness::steadiness(&jet)
-        });
         if at.band > 0 {
             self.band_priors(&jet.first(at.band), at, objective);
         }
@@ -186,18 +182,7 @@ impl<B: TrainBackend> Motion<'_, B> {
         objective.add("strain", loss.strain, || {
             strain::strain(jet, loss.strain_scale)
         });
-        objective.add("deviatoric", loss.deviatoric, || {
-            deviatoric::deviatoric(jet)
-        });
-        if let Some(normals) = &at.normals {
-            objective.add("stretch", loss.stretch, || {
-                stretch::stretch(jet, normals.clone())
-            });
-        }
         objective.add("screw", loss.screw, || screw::screw(jet));
-        objective.add("acceleration", loss.acceleration, || {
-            acceleration::acceleration(jet)
-        });
     }
 
     /// The jet of a `V` that does not train, as constants.

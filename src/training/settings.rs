@@ -1,7 +1,7 @@
 //! From the recipe's words to the model's types: in one place.
 
-use isomorph_model::activation::Activation;
-use isomorph_model::baseline::ends::EndWeights;
+use isomorph_model::autodiff::activation::Activation;
+use isomorph_model::flow::end_terms::EndWeights;
 use isomorph_model::operators::Derivatives;
 use isomorph_model::trajectory::{Integrator, Steps};
 use isomorph_model::{ImplicitNetConfig, VelocityNetConfig};

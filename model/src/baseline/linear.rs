@@ -1,7 +1,7 @@
 //! Straight lines between corresponding points: `x(t) = (1 - t) x_0 + t x_1`.
 //!
 //! The comparison applies it to all vertices of the two end meshes: the one row of its tables that uses the
-//! dense true correspondences, which no other method gets to see. It is exact for translations, and shrinks
+//! dense true correspondences, which no other method is given. It is exact for translations, and shrinks
 //! whatever turns.
 
 use burn::tensor::Tensor;

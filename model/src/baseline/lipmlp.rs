@@ -8,7 +8,7 @@
 //!
 //! each layer, the last included, with a `c` of its own (columns are the source's rows: inputs stand on the
 //! left here). In the maximum norm no layer stretches by more than its `softplus(c)`, nor does `f` by more
-//! than their product, and that product is punished:
+//! than their product, and that product is a term of the objective:
 //!
 //! ```text
 //! distances   mean (f - d)^2 at t = 0, 1, on the surfaces (d = 0) and in space     weight 1
@@ -36,12 +36,10 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal, Uniform};
 
-use super::ends::EndSamples;
-use crate::activation::Activation;
-use crate::backend::ModelBackend;
-use crate::morph::Geometry;
+use crate::autodiff::{Activation, ModelBackend, product};
+use crate::flow::Geometry;
+use crate::flow::end_terms::EndSamples;
 use crate::objective::Objective;
-use crate::product::product;
 
 /// Standard deviation of the first layer's weights for the position, in radians per normalised unit.
 const BANDWIDTH: f64 = 4.0;
@@ -232,8 +230,8 @@ impl<B: ModelBackend> Geometry<B> for LipMlp<B> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::testing::{check_gradients, directions, radius, spheres, trained};
     use super::*;
+    use crate::testing::learning::{check_gradients, directions, radius, spheres, trained};
     use crate::testing::{Plain, Train, column, host, points, shaken};
 
     fn config(depth: usize, width: usize) -> LipMlpConfig {

@@ -1,16 +1,16 @@
 //! The plain network `f(x, t)` fitted at t = 0 and t = 1: what lies between is what the perceptron makes of
 //! it ("MLP" in the paper's comparison, Section 5).
 //!
-//! The terms are those of [`super::ends`]; nothing is said about the times between, and nothing moves.
+//! The terms are those of [`end_terms`]; nothing is said about the times between, and nothing moves.
 
 use burn::module::Module;
 use burn::tensor::Tensor;
 use burn::tensor::backend::Backend;
 
-use super::ends::{self, EndSamples, EndWeights, Seen};
-use crate::backend::ModelBackend;
-use crate::implicit_net::{ImplicitNet, ImplicitNetConfig};
-use crate::morph::Geometry;
+use crate::autodiff::ModelBackend;
+use crate::flow::Geometry;
+use crate::flow::end_terms::{self, EndSamples, EndWeights, Seen};
+use crate::nets::{ImplicitNet, ImplicitNetConfig};
 use crate::objective::Objective;
 use crate::operators::{Derivatives, Operators};
 
@@ -38,7 +38,7 @@ pub struct PlainMlp<B: Backend> {
 }
 
 impl<B: ModelBackend> PlainMlp<B> {
-    /// The terms "data", "normals", "eikonal" and "off-surface" of [`super::ends`].
+    /// The terms "data", "normals", "eikonal" and "off-surface" of [`end_terms`].
     pub fn objective(
         &self,
         samples: &EndSamples<B>,
@@ -47,7 +47,7 @@ impl<B: ModelBackend> PlainMlp<B> {
     ) -> Objective<B> {
         let (x, t) = samples.all();
         let jet = operators.implicit_jet(&self.net, x, t);
-        ends::objective(&[Seen { samples, jet }], weights)
+        end_terms::objective(&[Seen { samples, jet }], weights)
     }
 }
 
@@ -63,8 +63,8 @@ impl<B: ModelBackend> Geometry<B> for PlainMlp<B> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::testing::{check_gradients, end_weights, radius, small, spheres, trained};
     use super::*;
+    use crate::testing::learning::{check_gradients, end_weights, radius, small, spheres, trained};
     use crate::testing::{Train, shaken};
 
     #[test]

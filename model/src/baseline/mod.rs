@@ -5,43 +5,20 @@
 //! | [`linear`] | straight lines between corresponding points | | points |
 //! | [`mlp`] | `f(x, t)` fitted at t = 0, 1 and nowhere else | the paper, Section 5 | surface |
 //! | [`blend`] | `(1 - t) g + t h` of the two distance fields | Payne and Toga 1992 | surface |
-//! | [`lipmlp`] | `f(x, t)` whose slope in time is bounded and punished | Liu et al. 2022 | surface |
+//! | [`lipmlp`] | `f(x, t)` with a trained, regularised bound on its slope in time | Liu et al. 2022 | surface |
 //! | [`nise`] | `f(x, t)` under a level-set equation between `g` and `h` | Novello et al. 2023 | surface |
 //! | [`nfgp`] | an invertible deformation that keeps lengths and curvature | Yang et al. 2021 | points |
 //! | [`eigenbasis`] | the flow of a divergence-free field in a sine basis | Eisenberger et al. 2019 | points |
 //!
 //! A method that gives a surface implements [`crate::Geometry`], one that moves points [`crate::Motion`].
 //! Each has a configuration (`init`), a burn module, and an [`crate::Objective`] of named terms made from
-//! samples given as tensors; [`ends`] holds what several of them share. Who samples and who steps the
-//! optimiser is not known here.
+//! samples given as tensors; [`crate::flow::end_terms`] holds what several of them share. Samples and steps of
+//! the optimiser are made elsewhere.
 
 pub mod blend;
 pub mod eigenbasis;
-pub mod ends;
 pub mod linear;
 pub mod lipmlp;
 pub mod mlp;
 pub mod nfgp;
 pub mod nise;
-
-use burn::module::{Module, ModuleMapper, Param, ParamId};
-use burn::tensor::Tensor;
-use burn::tensor::backend::Backend;
-
-/// The module with `offset` added to the number of each parameter.
-///
-/// Gradients and optimiser states are kept by these numbers, and every network counts its own from 1: two
-/// of them in one module would share each other's.
-pub(crate) fn renumbered<B: Backend, M: Module<B>>(module: M, offset: u64) -> M {
-    struct Renumber(u64);
-    impl<B: Backend> ModuleMapper<B> for Renumber {
-        fn map_float<const D: usize>(&mut self, param: Param<Tensor<B, D>>) -> Param<Tensor<B, D>> {
-            let id = ParamId::from(param.id.val() + self.0);
-            Param::initialized(id, param.val())
-        }
-    }
-    module.map(&mut Renumber(offset))
-}
-
-#[cfg(test)]
-mod testing;

@@ -1,7 +1,7 @@
 //! NISE: `f(x, t)` carried from one distance field to another by a level-set equation (Novello, da Silva,
 //! Schardong, Schirmer, Lopes, Velho, "Neural Implicit Surface Evolution", ICCV 2023).
 //!
-//! First two sine networks are fitted to the ends, `g` and `h`, a [`SdfBlend`], and are constants from then
+//! First two sine networks are fitted to the ends, `g` and `h`, a [`EndFields`], and are constants from then
 //! on. Then a third learns `f(x, t)` by
 //!
 //! ```text
@@ -33,17 +33,16 @@ use burn::module::Module;
 use burn::tensor::Tensor;
 use burn::tensor::backend::Backend;
 
-use super::blend::{SdfBlend, between};
-use super::ends::EndSamples;
-use super::renumbered;
-use crate::backend::ModelBackend;
-use crate::implicit_net::{ImplicitNet, ImplicitNetConfig};
+use crate::autodiff::ModelBackend;
+use crate::flow::Geometry;
+use crate::flow::end_fields::{EndFields, between};
+use crate::flow::end_terms::EndSamples;
 use crate::loss;
-use crate::morph::Geometry;
+use crate::nets::{ImplicitNet, ImplicitNetConfig, apart, renumbered};
 use crate::objective::Objective;
 use crate::operators::{Derivatives, ImplicitJet, Operators};
 
-/// What the parameters of the ends are numbered from.
+/// What the parameters of the ends are numbered from. It stands in checkpoints.
 const ENDS: u64 = 10_000;
 
 /// By which equation the surface moves between the ends.
@@ -66,17 +65,21 @@ pub struct NiseConfig {
 
 impl NiseConfig {
     /// A network that starts as a sphere, between two fitted ends.
+    ///
+    /// # Panics
+    /// If the network has more than 10,000 parameter tensors, two to a layer.
     pub fn init<B: ModelBackend>(
         &self,
-        ends: SdfBlend<B>,
+        ends: EndFields<B>,
         seed: u64,
         device: &B::Device,
     ) -> Nise<B> {
-        Nise {
+        let nise = Nise {
             net: self.implicit.init(seed, device),
             ends: renumbered(ends, ENDS),
             evolution: self.evolution,
-        }
+        };
+        apart(nise, "Nise")
     }
 }
 
@@ -102,7 +105,7 @@ impl Default for NiseWeights {
     }
 }
 
-/// Random positions and times, where the level-set equation is asked for.
+/// Random positions and times, where the level-set equation is sampled.
 #[derive(Clone, Debug)]
 pub struct BetweenSamples<B: Backend> {
     /// In the box and near both surfaces, `[n, 3]`.
@@ -115,7 +118,7 @@ pub struct BetweenSamples<B: Backend> {
 #[derive(Module, Debug)]
 pub struct Nise<B: Backend> {
     net: ImplicitNet<B>,
-    ends: SdfBlend<B>,
+    ends: EndFields<B>,
     #[module(skip)]
     evolution: Evolution,
 }
@@ -123,7 +126,7 @@ pub struct Nise<B: Backend> {
 impl<B: ModelBackend> Nise<B> {
     /// The terms "data", "normals" and "level-set".
     ///
-    /// Of the samples at the ends the points and their times are read; the values and normals wanted there
+    /// Of the samples at the ends the points and their times are read; the values and normals to be reached there
     /// are those of `g` and `h`.
     pub fn objective(
         &self,
@@ -198,10 +201,10 @@ pub fn interpolated_velocity<B: Backend>(
 #[cfg(test)]
 mod tests {
     use super::super::blend::tests::of_spheres;
-    use super::super::testing::{
+    use super::*;
+    use crate::testing::learning::{
         check_gradients, directions, radius, small_siren, spheres, trained,
     };
-    use super::*;
     use crate::testing::{Plain, Train, column, host, points, shaken};
 
     const RADII: [f64; 2] = [0.3, 0.5];

@@ -1,9 +1,9 @@
 //! The right sign and size away from the surface: `mean |f - d|` over the samples whose signed distance `d`
 //! to the given points is more than 0.05 either way, 0 at the others.
 //!
-//! Points with normals say nothing of the space that no point is near, where the Eikonal equation alone is as
-//! content with a closed surface too many as without it: what is left of the initial sphere between two legs,
-//! say. Near the surface, where thin parts make `d` unreliable, the other terms rule.
+//! Points with normals do not determine the space far from all points. The Eikonal equation holds there with a
+//! closed surface too many as well, such as a rest of the initial sphere between two legs. Near the surface,
+//! where thin parts make `d` unreliable, the other terms decide.
 //!
 //! # Differs from the paper
 //! The paper has no such term.
@@ -11,7 +11,7 @@
 use burn::tensor::Tensor;
 use burn::tensor::backend::Backend;
 
-/// In normalised units: nearer than this the term says nothing.
+/// In normalised units: nearer than this the term is 0.
 const FAR: f64 = 0.05;
 
 /// The mean of `|f - d|` where `|d|` is above 0.05, and of 0 elsewhere; both `[n, 1]`.

@@ -2,8 +2,8 @@
 //! times (Gropp et al. 2020).
 //!
 //! # Differs from the paper
-//! The paper's printed total has no such term, and without one `f = 0` everywhere satisfies all of it:
-//! the printed method collapses there (`shared/probes/prototype.md`). With the level-set equation in its
+//! The paper's printed total has no such term. Without one `f = 0` everywhere solves the level-set equation and
+//! puts every point on the surface, and training finds that solution. With the level-set equation in its
 //! original form (OLSE) the paper adds `mean ||grad f| - 1|`; the square has a gradient that vanishes at
 //! the solution, which trains more calmly.
 

@@ -10,8 +10,8 @@
 //!
 //! # Differs from the paper
 //! The paper prints `lambda_l = 10`. On an exact moving distance field `d|grad f|/dt` along the flow
-//! vanishes for `lambda_l = 1` and for no other value (derived, and checked in this file's tests on the
-//! expanding sphere), so 1 is the default.
+//! vanishes for `lambda_l = 1` and for no other value, so 1 is the default. `loss/tests/values.rs` checks that
+//! on the expanding sphere.
 
 use burn::tensor::Tensor;
 use burn::tensor::backend::Backend;
@@ -36,6 +36,7 @@ pub fn level_set_residual<B: Backend>(
     lambda_l: f64,
 ) -> Tensor<B, 2> {
     let carried = material_derivative(f, v);
+    // `R` divides by `|grad f|` and takes a product with `J`: not needed for the OLSE.
     if lambda_l == 0.0 {
         return carried;
     }

@@ -13,17 +13,11 @@
 //! | [`smoothness`] | `|(-alpha Laplacian + gamma) V|` | `L_v` |
 //! | [`divergence`] | `|div V|` | `L_v` |
 //! | [`strain`] | `|D|^2`, `D = (J + J^T) / 2` | ours |
-//! | [`deviatoric`] | `|D - (tr D / 3) I|^2` | ours |
-//! | [`stretch`] | `|P D P|^2`, `P = I - n n^T` | ours |
-//! | [`steadiness`] | `|dV/dt|^2` | ours |
 //! | [`screw`] | `|dV/dt + D V|^2` | ours |
-//! | [`acceleration`] | `|dV/dt + J V|^2` | ours |
 //! | [`distance`] | `|f - d|`, `d` the signed distance, away from the surface | ours |
 //! | [`off_surface`] | `exp(-100 |f|)` | ours, after SIREN |
 
-pub mod acceleration;
 pub mod data;
-pub mod deviatoric;
 pub mod distance;
 pub mod divergence;
 pub mod eikonal;
@@ -33,9 +27,7 @@ pub mod normals;
 pub mod off_surface;
 pub mod screw;
 pub mod smoothness;
-pub mod steadiness;
 pub mod strain;
-pub mod stretch;
 
 #[cfg(test)]
 mod tests;

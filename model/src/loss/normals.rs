@@ -1,8 +1,8 @@
 //! The normal of `f` is the normal of the surface: `mean (1 - <n, n_given>)`, `n = grad f / |grad f|`.
 //!
 //! At `t = 0, 1` against the normals of the data; in between against normals carried along `V` by
-//! `dn/dt = -J^T n` ([`crate::operators::transport`]), without a gradient through the carried normal. The
-//! probes found the second the decisive term in between.
+//! `dn/dt = -J^T n` ([`crate::flow::transport::transport`]), without a gradient through the carried normal.
+//! The level-set equation holds the values of `f` in between; only this term holds the direction of its slope.
 //!
 //! # Differs from the paper
 //! Transported normals are ours.

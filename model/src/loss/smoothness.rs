@@ -11,15 +11,16 @@ use crate::operators::{VelocityJet, length};
 /// The mean length of `gamma V - alpha Laplacian V`.
 ///
 /// # Panics
-/// If the jet was asked for without its Laplacian and `alpha` is not 0.
+/// If the jet has no Laplacian and `alpha` is not 0.
 pub fn smoothness<B: Backend>(v: &VelocityJet<B>, alpha: f64, gamma: f64) -> Tensor<B, 1> {
     let still = v.value.clone() * gamma;
+    // The Laplacian is the dearest of all derivatives, and jets without it are common.
     if alpha == 0.0 {
         return length(still).mean();
     }
     let laplacian = v
         .laplacian
         .clone()
-        .expect("the smoothness term asks for the Laplacian");
+        .expect("the smoothness term needs the Laplacian of the jet");
     length(still - laplacian * alpha).mean()
 }

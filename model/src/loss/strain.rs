@@ -31,7 +31,7 @@ pub fn strain<B: Backend>(v: &VelocityJet<B>, scale: f64) -> Tensor<B, 1> {
 }
 
 /// The squared Frobenius norm of each matrix, `[n, 3, 3]` to `[n, 1]`.
-pub(super) fn squared_norm<B: Backend>(matrices: Tensor<B, 3>) -> Tensor<B, 2> {
+fn squared_norm<B: Backend>(matrices: Tensor<B, 3>) -> Tensor<B, 2> {
     let n = matrices.dims()[0];
     let flat = matrices.reshape([n, 9]);
     (flat.clone() * flat).sum_dim(1)

@@ -9,17 +9,16 @@
 //! lap = s'(z) lap z + s''(z) sum_k z_k^2
 //! ```
 //!
-//! Value and lanes (three tangents, then a time tangent and the Laplacian where asked for) are stacked
-//! along the batch axis: one matrix product and one activation ([`crate::jet`]) per layer, which one
+//! Value and lanes (three tangents, then a time tangent and the Laplacian where requested) are stacked
+//! along the batch axis: one matrix product and one activation ([`crate::autodiff::jet`]) per layer, which one
 //! level of autodiff differentiates by the weights.
 
 use burn::tensor::{Tensor, TensorData};
 
-use super::{VelocityJet, VelocityRequest};
-use crate::backend::ModelBackend;
-use crate::encoding::encoding_derivatives;
-use crate::jet::Lanes;
-use crate::velocity_net::VelocityNet;
+use super::jets::{VelocityJet, VelocityRequest};
+use crate::autodiff::{Lanes, ModelBackend};
+use crate::nets::VelocityNet;
+use crate::nets::encoding::encoding_derivatives;
 
 /// `V`, `J`, and what `request` names, in one sweep.
 pub fn velocity_jet<B: ModelBackend>(
@@ -43,6 +42,7 @@ pub fn velocity_jet<B: ModelBackend>(
     let out = mlp.output().linear(sweep);
     let block = |k: usize| out.clone().slice([k * n..(k + 1) * n, 0..3]);
     let columns = [1, 2, 3].map(|k| block(k).reshape([n, 3, 1]));
+    // The output layer is affine: its bias moves the value and no derivative.
     VelocityJet {
         value: block(0) + mlp.output().bias.val(),
         jacobian: Tensor::cat(columns.to_vec(), 2),
@@ -63,6 +63,7 @@ fn seed<B: ModelBackend>(
     let (first, second) = encoding_derivatives(x.clone(), net.frequencies);
     let width = first.dims()[1];
     let padded = |block: Tensor<B, 2>| {
+        // Time does not change along a direction of space.
         if net.time_dependent {
             Tensor::cat(vec![block, Tensor::zeros([n, 1], &device)], 1)
         } else {

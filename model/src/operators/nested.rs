@@ -12,12 +12,11 @@ use burn::tensor::Tensor;
 use burn::tensor::backend::Backend;
 use burn_autodiff::Autodiff;
 
-use super::{ImplicitJet, VelocityJet, VelocityRequest};
-use crate::backend::ModelBackend;
-use crate::implicit_net::ImplicitNet;
-use crate::velocity_net::VelocityNet;
+use super::jets::{ImplicitJet, VelocityJet, VelocityRequest};
+use crate::autodiff::ModelBackend;
+use crate::nets::{ImplicitNet, VelocityNet};
 
-/// A copy of the tensor one level up, whose gradient is wanted there.
+/// A copy of the tensor one level up, with a gradient there.
 fn lift<B: ModelBackend>(tensor: Tensor<B, 2>) -> Tensor<Autodiff<B>, 2> {
     Tensor::from_inner(tensor).require_grad()
 }
@@ -31,6 +30,7 @@ pub fn implicit_jet<B: ModelBackend>(
     let lifted = net.clone().train::<Autodiff<B>>().no_grad();
     let (x, t) = (lift(x), lift(t));
     let value = lifted.forward(x.clone(), t.clone());
+    // Row `i` of `f` depends on row `i` of the input alone, so the gradient of the sum holds each row's own.
     let mut grads = value.clone().sum().backward();
     ImplicitJet {
         value: value.inner(),
@@ -49,6 +49,7 @@ pub fn pulled_back<B: ModelBackend>(
     w: Tensor<B, 2>,
 ) -> (Tensor<B, 2>, Tensor<B, 2>) {
     let lifted = net.clone().train::<Autodiff<B>>().no_grad();
+    // Time is a constant here: nothing is differentiated by it.
     let x = lift(x);
     let value = lifted.forward(x.clone(), Tensor::from_inner(t));
     let mut grads = (value.clone() * Tensor::from_inner(w)).sum().backward();
@@ -92,6 +93,7 @@ fn without_laplacian<B: ModelBackend>(
     let x = lift(stacked(x, 3));
     let t = lift(stacked(t, 3));
     let value = lifted.forward(x.clone(), t.clone());
+    // One backward per graph: a second one over the same graph finds no gradients.
     let sum = components(&value, n, 1);
     let mut grads = sum.backward();
     let rows = x
@@ -119,6 +121,7 @@ fn with_laplacian<B: ModelBackend>(
 ) -> VelocityJet<B> {
     let n = x.dims()[0];
     let lifted = net.clone().train::<Autodiff<B>>().no_grad();
+    // Two levels: the gradient of the first backward has to be differentiated on the second.
     let twice = lifted.train::<Autodiff<Autodiff<B>>>().no_grad();
     let x1 = lift(stacked(x, 9));
     let x2 = lift(x1.clone());
@@ -133,6 +136,7 @@ fn with_laplacian<B: ModelBackend>(
             .grad_remove(&mut grads)
             .expect("V depends on every time")
             .inner();
+        // The three copies of a component have the same rate.
         let each = |i: usize| rates.clone().slice([3 * i * n..(3 * i + 1) * n, 0..1]);
         Tensor::cat(vec![each(0), each(1), each(2)], 1)
     });
@@ -150,6 +154,7 @@ fn with_laplacian<B: ModelBackend>(
     let laplacian = (along(0) + along(1) + along(2))
         .reshape([3, n])
         .swap_dims(0, 1);
+    // Row `i` of the Jacobian is the gradient in any of the three copies of component `i`.
     let rows = first
         .inner()
         .reshape([3, 3, n, 3])

@@ -10,12 +10,10 @@
 
 use burn::tensor::Tensor;
 
-use super::ImplicitJet;
-use crate::backend::ModelBackend;
-use crate::encoding::encoding_derivatives;
-use crate::implicit_net::ImplicitNet;
-use crate::mlp::Mlp;
-use crate::velocity_net::VelocityNet;
+use super::jets::ImplicitJet;
+use crate::autodiff::ModelBackend;
+use crate::nets::encoding::encoding_derivatives;
+use crate::nets::{ImplicitNet, Mlp, VelocityNet};
 
 /// `f`, `grad f`, `f_t`.
 pub fn implicit_jet<B: ModelBackend>(
@@ -28,6 +26,7 @@ pub fn implicit_jet<B: ModelBackend>(
     let columns = features.dims()[1];
     let ones = Tensor::ones([n, 1], &x.device());
     let (value, g) = value_and_pullback(&net.mlp, features, ones);
+    // Time is the last column, and enters as it is.
     let rate = g.clone().slice([0..n, columns - 1..columns]);
     let gradient = through_encoding(x.clone(), g, net.frequencies);
     match net.sphere_jet(x) {
@@ -67,6 +66,7 @@ fn value_and_pullback<B: ModelBackend>(
     for (k, layer) in mlp.hidden().iter().enumerate() {
         let z = layer.linear(mlp.layer_input(k, hidden, &input));
         let (value, slope) = mlp.activation().value_and_slope(z, layer.bias.val());
+        // The way back reads the slopes, which come with the values at little cost.
         slopes.push(slope);
         hidden = value;
     }
@@ -76,6 +76,7 @@ fn value_and_pullback<B: ModelBackend>(
     for ((k, layer), slope) in mlp.hidden().iter().enumerate().zip(slopes).rev() {
         g = layer.transposed(g * slope);
         if mlp.skips_at(k) {
+            // The input entered here a second time. Its two gradients are added at the end.
             let columns = g.dims()[1];
             let g_both = g / 2f64.sqrt();
             past_the_skip = Some(g_both.clone().slice([0..n, columns - inputs..columns]));
@@ -100,6 +101,7 @@ fn through_encoding<B: ModelBackend>(
     }
     let (first, _) = encoding_derivatives(x, frequencies);
     let width = first.dims()[1];
+    // Columns come in blocks of three, one block per function and one column per coordinate.
     let each = g.slice([0..n, 0..width]) * first;
     each.reshape([n, width / 3, 3]).sum_dim(1).reshape([n, 3])
 }

@@ -1,15 +1,11 @@
 //! The two ways of differentiating against each other, against float64 central differences, and against
 //! closed forms.
 
-use burn::tensor::Tensor;
-
 use super::*;
-use crate::activation::Activation;
-use crate::encoding::encoding_scale;
-use crate::implicit_net::ImplicitNetConfig;
-use crate::mlp::Mlp;
+use crate::autodiff::Activation;
+use crate::nets::encoding::encoding_scale;
+use crate::nets::{ImplicitNetConfig, Mlp, VelocityNetConfig};
 use crate::testing::{Plain, Train, column, host, points, shaken};
-use crate::velocity_net::VelocityNetConfig;
 
 const POINTS: [[f64; 3]; 4] = [
     [0.1, -0.3, 0.25],
@@ -66,7 +62,7 @@ fn mlp_in_f64(mlp: &Mlp<Plain>, input: &[f64]) -> Vec<f64> {
         Activation::Softplus { beta } => z.max(0.0) + (-(beta * z).abs()).exp().ln_1p() / beta,
         Activation::Sine { omega } => (omega * z).sin(),
     };
-    let affine = |layer: &crate::mlp::Dense<Plain>, x: &[f64]| {
+    let affine = |layer: &crate::nets::mlp::Dense<Plain>, x: &[f64]| {
         let (weight, bias) = (host(layer.weight.val()), host(layer.bias.val()));
         let columns = bias.len();
         let product = |j: usize| -> f64 {
@@ -294,70 +290,6 @@ fn divergence_and_strain_of_rotation_shear_and_expansion() {
     assert_close(&along, &[3.0, 0.0, 0.0].repeat(4), 1e-7, "shear along y");
     let expansion = linear([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], &POINTS);
     assert_close(&host(expansion.divergence()), &[3.0; 4], 1e-7, "expansion");
-}
-
-/// `V = (y, 0, 0)`: what the transport of normals can be checked on in closed form.
-struct Shear;
-
-impl Operators for Shear {
-    fn implicit_jet<B: ModelBackend>(
-        &self,
-        _: &ImplicitNet<B>,
-        _: Tensor<B, 2>,
-        _: Tensor<B, 2>,
-    ) -> ImplicitJet<B> {
-        unreachable!("the transport of normals does not ask for f")
-    }
-
-    fn velocity_jet<B: ModelBackend>(
-        &self,
-        _: &VelocityNet<B>,
-        _: Tensor<B, 2>,
-        _: Tensor<B, 2>,
-        _: VelocityRequest,
-    ) -> VelocityJet<B> {
-        unreachable!("the transport of normals asks for one product only")
-    }
-
-    fn pulled_back<B: ModelBackend>(
-        &self,
-        _: &VelocityNet<B>,
-        x: Tensor<B, 2>,
-        _: Tensor<B, 2>,
-        w: Tensor<B, 2>,
-    ) -> (Tensor<B, 2>, Tensor<B, 2>) {
-        let n = x.dims()[0];
-        let zero = Tensor::zeros([n, 1], &x.device());
-        let velocity = vec![x.slice([0..n, 1..2]), zero.clone(), zero.clone()];
-        let pulled = vec![zero.clone(), w.slice([0..n, 0..1]), zero];
-        (Tensor::cat(velocity, 1), Tensor::cat(pulled, 1))
-    }
-}
-
-#[test]
-fn a_shear_carries_normals_as_covectors() {
-    let net = velocity(SOFT, 0, 0, false);
-    let (x, n) = (
-        points(&[[0.2, 0.5, 0.0]; 2]),
-        points(&[[1.0, 0.0, 0.0], [0.0, 0.6, 0.8]]),
-    );
-    let (from, to) = (column(&[0.0; 2]), column(&[0.5; 2]));
-    let (steps, method) = (Steps::Even(3), Integrator::Midpoint);
-    let (x, n) = transport(&Shear, &net, x, n, from, to, steps, method);
-    // The flow is linear in time, so the midpoint rule is exact: n = (1, -t, 0) before normalising.
-    let root = 1.25f64.sqrt();
-    assert_close(
-        &host(x),
-        &[0.45, 0.5, 0.0, 0.45, 0.5, 0.0],
-        1e-6,
-        "positions",
-    );
-    assert_close(
-        &host(n),
-        &[1.0 / root, -0.5 / root, 0.0, 0.0, 0.6, 0.8],
-        1e-6,
-        "normals",
-    );
 }
 
 #[test]

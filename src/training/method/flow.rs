@@ -4,7 +4,7 @@
 use std::io;
 
 use burn::module::Module;
-use isomorph_model::baseline::blend::{SdfBlend, SdfBlendConfig};
+use isomorph_model::flow::end_fields::{EndFields, EndFieldsConfig};
 use isomorph_model::{FlowGeometry, Geometry, TrainBackend, VelocityNet};
 
 use super::ends::OnDevice;
@@ -31,7 +31,7 @@ pub(super) struct Flow<B: TrainBackend> {
     device: B::Device,
     /// What holds both shapes and the space around them.
     bounds: Bounds,
-    ends: Trainee<B, SdfBlend<B>>,
+    ends: Trainee<B, EndFields<B>>,
     velocity: Trainee<B, VelocityNet<B>>,
 }
 
@@ -41,7 +41,7 @@ impl<B: TrainBackend> Flow<B> {
         let settings = Settings::new(recipe);
         let seed = settings.training.seed;
         let implicit = settings.implicit;
-        let ends = SdfBlendConfig { implicit }.init(seed, device);
+        let ends = EndFieldsConfig { implicit }.init(seed, device);
         // The end fields take `seed` and the one after it.
         let velocity = settings.velocity.init(seed.wrapping_add(2), device);
         Self {

@@ -8,7 +8,7 @@
 use std::io;
 
 use burn::module::Module;
-use isomorph_model::activation::Activation;
+use isomorph_model::autodiff::activation::Activation;
 use isomorph_model::baseline::blend::{SdfBlend, SdfBlendConfig};
 use isomorph_model::baseline::nise::{BetweenSamples, Evolution, Nise, NiseConfig, NiseWeights};
 use isomorph_model::{Geometry, ImplicitNetConfig, Motion, TrainBackend};

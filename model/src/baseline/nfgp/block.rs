@@ -29,11 +29,10 @@ use burn::tensor::{Tensor, TensorData};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::{FixedPoint, NfgpConfig};
-use crate::backend::ModelBackend;
-use crate::encoding::{encode, encoded_width, encoding_derivatives};
-use crate::mlp::Dense;
-use crate::product::product;
+use super::config::{FixedPoint, NfgpConfig};
+use crate::autodiff::{ModelBackend, product};
+use crate::nets::encoding::{encode, encoded_width, encoding_derivatives};
+use crate::nets::mlp::Dense;
 
 /// The initial norm of the output layer: a block starts near the identity.
 const INITIAL_OUTPUT: f64 = 0.01;
@@ -102,6 +101,7 @@ impl<B: ModelBackend> Block<B> {
         let m = config.frequencies as f64;
         let layers = self.layers.iter().map(|layer| {
             let weight = layer.weight.val();
+            // A layer that keeps to its bound by itself is left as it is.
             let norm = spectral_bound(weight.clone()).clamp_min(1.0);
             (weight / norm, layer.bias.val())
         });
@@ -314,6 +314,7 @@ impl<B: ModelBackend> Normalised<B> {
         let axis = |k: usize| {
             let mut unit = [0.0; 3];
             unit[k] = 1.0;
+            // `repeat_dim`, whose backward is wrong in burn 0.21, does no harm to constants.
             Tensor::<B, 1>::from_floats(unit, &x.device())
                 .reshape([1, 3])
                 .repeat_dim(0, n)

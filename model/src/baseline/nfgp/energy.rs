@@ -25,15 +25,15 @@
 use burn::tensor::Tensor;
 use burn::tensor::backend::Backend;
 
-use super::Nfgp;
-use crate::backend::ModelBackend;
+use super::deformation::Nfgp;
+use crate::autodiff::ModelBackend;
 use crate::objective::Objective;
 use crate::operators::length;
 
 /// What one step of the optimisation of one pose is taken on, all of `[.., 3]`, normalised.
 #[derive(Clone, Debug)]
 pub struct NfgpSamples<B: Backend> {
-    /// Points of the source that are told where to go, `[h, 3]`.
+    /// Points of the source whose marks are given, `[h, 3]`.
     pub handles: Tensor<B, 2>,
     /// Where they are to go, `[h, 3]`: for time t of a motion, the share t of the straight way to their
     /// correspondents.
@@ -123,6 +123,7 @@ impl<B: Backend> SurfacePoint<B> {
 /// `[n, 3]` to two of `[n, 3]`.
 pub fn tangents<B: Backend>(normal: Tensor<B, 2>) -> [Tensor<B, 2>; 2] {
     let [x, y, z] = coordinates(normal);
+    // The sign of `z` keeps `sign + z` away from 0 at both poles.
     let sign = z.ones_like().mask_fill(z.clone().lower_elem(0.0), -1.0);
     let a = -z.ones_like() / (sign.clone() + z);
     let b = x.clone() * y.clone() * a.clone();
@@ -180,6 +181,7 @@ impl<B: ModelBackend> Nfgp<B> {
         });
         let n = samples.points.dims()[0];
         let here = SurfacePoint::at_rest(samples.points.clone(), samples.normals.clone());
+        // Without the bend no neighbour goes through the network: half of the points.
         if weights.bend == 0.0 {
             objective.add("stretch", weights.stretch, || {
                 stretch(&deformed(&here).tangents).mean()

@@ -18,10 +18,12 @@ use burn::tensor::Tensor;
 use burn::tensor::backend::Backend;
 
 use super::block::{Normalised, largest};
+use super::config::{FixedPoint, NfgpConfig};
+use super::deformation::Nfgp;
 use super::energy::{cross, dot};
-use super::{FixedPoint, Nfgp, NfgpConfig};
-use crate::backend::ModelBackend;
-use crate::morph::Motion;
+use crate::autodiff::ModelBackend;
+use crate::flow::Motion;
+use crate::nets::apart;
 
 /// Newton steps after which the inverse at a time in between ends in any case; three are usual.
 const NEWTON_STEPS: usize = 10;
@@ -50,10 +52,11 @@ impl NfgpMotionConfig {
         let config = &self.deformation;
         let deformations = (0..self.times as u64)
             .map(|k| config.numbered(seed.wrapping_add(k), k * config.parameters(), device));
-        NfgpMotion {
+        let motion = NfgpMotion {
             deformations: deformations.collect(),
             inverse: self.inverse,
-        }
+        };
+        apart(motion, "NfgpMotion")
     }
 }
 
@@ -168,6 +171,7 @@ impl<B: ModelBackend> Pose<B> {
         let y = y.detach();
         let ends = [&self.below, above].map(|end| end.inverse(y.clone(), until));
         let [below, beyond] = ends;
+        // The mixture of the inverses is exact where both ends differ by a translation.
         let mut x = mix(below, beyond, *weight);
         for _ in 0..NEWTON_STEPS {
             let (value, columns) = self.jet(x.clone());

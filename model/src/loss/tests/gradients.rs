@@ -4,16 +4,13 @@ use burn::module::{AutodiffModule, ModuleMapper, ModuleVisitor, Param};
 use burn::optim::GradientsParams;
 use burn::tensor::Tensor;
 
-use crate::activation::Activation;
-use crate::backend::TrainBackend;
-use crate::implicit_net::{ImplicitNet, ImplicitNetConfig};
+use crate::autodiff::{Activation, TrainBackend};
+use crate::flow::trajectory::{Integrator, Steps, integrate};
+use crate::flow::transport::transport;
 use crate::loss::*;
-use crate::operators::{
-    Derivatives, ImplicitJet, Operators, VelocityJet, VelocityRequest, transport,
-};
+use crate::nets::{ImplicitNet, ImplicitNetConfig, VelocityNet, VelocityNetConfig};
+use crate::operators::{Derivatives, ImplicitJet, Operators, VelocityJet, VelocityRequest};
 use crate::testing::{column, host, points, shaken};
-use crate::trajectory::{Integrator, Steps, integrate};
-use crate::velocity_net::{VelocityNet, VelocityNetConfig};
 
 /// What a term is made of, on the training backend.
 struct Scene<B: TrainBackend> {
@@ -210,19 +207,7 @@ fn terms<B: TrainBackend>() -> Vec<(&'static str, bool, bool, fn(&Scene<B>) -> T
         ("strain of a scale", false, true, |s| {
             strain::strain(&s.v_jet(), 0.3)
         }),
-        ("deviatoric", false, true, |s| {
-            deviatoric::deviatoric(&s.v_jet())
-        }),
-        ("stretch", false, true, |s| {
-            stretch::stretch(&s.v_jet(), points(&[[0.0, 0.6, 0.8]; 3]))
-        }),
         ("screw", false, true, |s| screw::screw(&s.v_jet())),
-        ("acceleration", false, true, |s| {
-            acceleration::acceleration(&s.v_jet())
-        }),
-        ("steadiness", false, true, |s| {
-            steadiness::steadiness(&s.v_jet())
-        }),
         ("distance", true, false, |s| {
             distance::distance(s.f_jet().value, column(&[0.4, -0.3, 0.2]))
         }),

@@ -2,11 +2,13 @@
 
 use std::f64::consts::PI;
 
-use burn::module::{AutodiffModule, ModuleMapper, ModuleVisitor, Param};
+use burn::module::{AutodiffModule, Module, ModuleMapper, ModuleVisitor, Param};
 use burn::optim::{AdamConfig, GradientsParams, Optimizer};
+use burn::tensor::Tensor;
 
 use super::super::*;
 use super::{SMALL, farthest, scattered};
+use crate::autodiff::ModelBackend;
 use crate::objective::Objective;
 use crate::operators::length;
 use crate::testing::{Plain, Train, host, points, shaken};

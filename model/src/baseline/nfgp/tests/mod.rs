@@ -5,12 +5,13 @@ mod energy;
 
 use std::collections::HashSet;
 
-use burn::module::{ModuleMapper, Param, list_param_ids};
-use burn::tensor::TensorData;
+use burn::module::{Module, ModuleMapper, Param, list_param_ids};
+use burn::tensor::{Tensor, TensorData};
 
-use super::block::spectral_bound;
+use super::block::{self, spectral_bound};
 use super::*;
-use crate::morph::Motion;
+use crate::autodiff::ModelBackend;
+use crate::flow::Motion;
 use crate::operators::length;
 use crate::testing::{Plain, host, points, shaken};
 

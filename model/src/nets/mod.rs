@@ -1,0 +1,24 @@
+//! The networks: the Implicit-Net `f(x, t)`, the Velocity-Net `V(x, t)`, and what both are made of.
+//!
+//! | file | what |
+//! |---|---|
+//! | [`implicit_net`] | `f(x, t)`, a signed distance that starts as that of a sphere |
+//! | [`velocity_net`] | `V(x)` or `V(x, t)`, which starts close to zero |
+//! | [`mlp`] | the multilayer perceptron inside both |
+//! | [`encoding`] | the positional encoding of the points that enter it |
+//! | `initial` | the initial weights |
+//! | `renumber` | the numbers of parameters, where one module holds several networks |
+//!
+//! These files use [`crate::autodiff`] and nothing above it. Derivatives of the networks are in [`crate::operators`].
+
+pub mod encoding;
+pub mod implicit_net;
+mod initial;
+pub mod mlp;
+mod renumber;
+pub mod velocity_net;
+
+pub use implicit_net::{ImplicitNet, ImplicitNetConfig};
+pub use mlp::{Mlp, MlpConfig};
+pub(crate) use renumber::{apart, renumbered};
+pub use velocity_net::{VelocityNet, VelocityNetConfig};
