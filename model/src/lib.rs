@@ -39,6 +39,7 @@ mod initial;
 pub mod jet;
 #[cfg(any(feature = "ndarray", feature = "flex"))]
 mod kernel;
+pub mod linear;
 pub mod loss;
 mod machine;
 mod mlp;
