@@ -4,7 +4,8 @@
 //! A reader's path: `main.rs`, [`cli`] (`train.rs`), [`learner`] (`mod.rs`, `step.rs`), then the terms and
 //! operators in [`isomorph_model`]. Arrows run one way: `cli -> learner -> model`,
 //! `cli -> surface -> model`, `cli -> evaluate -> shape`, `cli -> matching -> shape`,
-//! `cli -> compare -> evaluate`.
+//! `cli -> compare -> evaluate`, and below them all `shape -> formats -> geometry` and
+//! `surface -> cubes -> geometry`.
 
 // The thrice lifted autodiff types nest deeper than the default limit allows.
 #![recursion_limit = "256"]
@@ -13,7 +14,10 @@ pub mod atomic;
 pub mod backend;
 pub mod cli;
 pub mod compare;
+pub mod cubes;
 pub mod evaluate;
+pub mod formats;
+pub mod geometry;
 pub mod learner;
 pub mod matching;
 pub mod recipe;

@@ -7,11 +7,11 @@ use anyhow::Result;
 use indicatif::{ProgressBar, ProgressStyle};
 use isomorph_model::ModelBackend;
 
-use crate::evaluate::{Candidate, Carried, EvaluateError, Evaluation, Mesh, Purpose, Reference};
+use crate::cubes::{ExtractError, Grid, GridError};
+use crate::evaluate::{Candidate, Carried, EvaluateError, Evaluation, Purpose, Reference};
+use crate::geometry::Mesh;
 use crate::shape::Normalisation;
-use crate::surface::SurfaceMesh;
-use crate::surface::extract::{ExtractError, Grid, GridError};
-use crate::surface::frames::FramesError;
+use crate::surface::FramesError;
 use crate::surface::trained::{Surface, Trained};
 
 /// Cells along the longest side where a surface only serves to find the best times.
@@ -41,7 +41,7 @@ struct Measured<'a, B: ModelBackend> {
     coarse: Grid,
     /// The coarse surface extracted last, in the method's coordinates, and its time; no mesh if it had
     /// vanished.
-    anchor: Option<(f64, Option<SurfaceMesh>)>,
+    anchor: Option<(f64, Option<Mesh<f32>>)>,
 }
 
 impl<'a, B: ModelBackend> Measured<'a, B> {
@@ -57,7 +57,7 @@ impl<'a, B: ModelBackend> Measured<'a, B> {
     }
 
     /// The zero set of the method's field; `None` where it is empty.
-    fn extracted(&self, grid: &Grid, time: f64) -> Result<Option<SurfaceMesh>, FramesError> {
+    fn extracted(&self, grid: &Grid, time: f64) -> Result<Option<Mesh<f32>>, FramesError> {
         match self.trained.surface_at(grid, time) {
             Ok(found) => Ok(Some(found.mesh)),
             // The field has one sign in the whole box: the surface has vanished.
@@ -70,7 +70,7 @@ impl<'a, B: ModelBackend> Measured<'a, B> {
     }
 
     /// The coarse surface of a time not far from `time`, carried there.
-    fn near_anchor(&mut self, time: f64) -> Result<Option<SurfaceMesh>, FramesError> {
+    fn near_anchor(&mut self, time: f64) -> Result<Option<Mesh<f32>>, FramesError> {
         let near = (time * ANCHORS).round() / ANCHORS;
         let known = self.anchor.take().filter(|(at, _)| *at == near);
         let mesh = match known {
@@ -112,7 +112,7 @@ impl<B: ModelBackend> Candidate for Measured<'_, B> {
 
     /// The zero set of the method's field, where it is not empty; a method that only carries the source's
     /// mesh has no surface beside that one.
-    fn surface(&mut self, time: f64, purpose: Purpose) -> Result<Option<Mesh>, FramesError> {
+    fn surface(&mut self, time: f64, purpose: Purpose) -> Result<Option<Mesh<f64>>, FramesError> {
         if matches!(self.trained.shape, Surface::Template(_)) {
             return Ok(None);
         }
@@ -121,7 +121,7 @@ impl<B: ModelBackend> Candidate for Measured<'_, B> {
             Purpose::Aligning => self.extracted(&self.coarse, time)?,
             Purpose::Measured => self.extracted(&self.fine, time)?,
         };
-        let measured = |mesh: SurfaceMesh| {
+        let measured = |mesh: Mesh<f32>| {
             let vertices = self.measured(mesh.vertices);
             Mesh::of_points(&vertices, &mesh.triangles)
         };

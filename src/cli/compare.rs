@@ -22,10 +22,11 @@ use crate::compare::{
     self, Entry, FramePair, Inputs, Lookup, Machine, MethodPlan, Plan, Request, Store,
 };
 use crate::evaluate::{GroundTruth, Options, Reference, Span};
+use crate::formats::{SurfaceFormat, write_surface};
+use crate::geometry::Mesh;
 use crate::recipe::{Preset, Recipe};
 use crate::report::{Reporter, Verbosity};
 use crate::shape::Normalisation;
-use crate::surface::write::{SurfaceFormat, SurfaceView, write_surface};
 
 /// Compare methods on pairs of frames of a sequence, in one table and one figure
 ///
@@ -270,12 +271,9 @@ impl Bench {
         std::fs::create_dir_all(&folder)
             .with_context(|| format!("{}: cannot be made", folder.display()))?;
         for (frame, name) in [(pair.from, "source.ply"), (pair.to, "target.ply")] {
-            let view = SurfaceView {
-                vertices: self.truth.vertices(frame),
-                triangles: self.truth.triangles(),
-                normals: None,
-            };
-            write_surface(view, &folder.join(name), SurfaceFormat::Ply)?;
+            let vertices = self.truth.vertices(frame).to_vec();
+            let mesh = Mesh::new(vertices, self.truth.triangles().to_vec());
+            write_surface(&mesh, &folder.join(name), SurfaceFormat::Ply)?;
         }
         Ok(())
     }

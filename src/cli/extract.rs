@@ -10,12 +10,12 @@ use super::trained;
 use super::training::write_and_show;
 use super::{BackendArgs, Ending, QuietArgs, Usage, even_times, stop_on_interrupt};
 use crate::backend::{self, Task};
+use crate::formats::SurfaceFormat;
 use crate::learner::checkpoint::Checkpoint;
 use crate::recipe::Recipe;
 use crate::report::Reporter;
 use crate::run_directory::RunDirectory;
 use crate::surface::frames::FrameOptions;
-use crate::surface::write::SurfaceFormat;
 
 /// Write the surfaces of a trained run at any times, in any resolution
 ///

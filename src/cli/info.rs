@@ -7,6 +7,7 @@ use anyhow::{Context, Result};
 use clap::Args;
 
 use super::Ending;
+use crate::geometry::EdgeSharing;
 use crate::learner::checkpoint::{self, Checkpoint};
 use crate::recipe::{MethodName, Recipe};
 use crate::run_directory::RunDirectory;
@@ -44,15 +45,15 @@ fn shape_info(shape: &Shape) -> Result<String> {
         "point cloud"
     };
     writeln!(text, "{}: {kind}", shape.path.display())?;
-    writeln!(text, "vertices     {}", shape.vertices.len())?;
-    writeln!(text, "triangles    {}", shape.triangles.len())?;
-    let normals = if shape.normals.is_some() {
+    writeln!(text, "vertices     {}", shape.mesh.vertices.len())?;
+    writeln!(text, "triangles    {}", shape.mesh.triangles.len())?;
+    let normals = if shape.mesh.normals.is_some() {
         "given"
     } else {
         "none"
     };
     writeln!(text, "normals      {normals}")?;
-    let (low, high) = box_of(&shape.vertices);
+    let (low, high) = box_of(&shape.mesh.vertices);
     writeln!(text, "box          {low:?} to {high:?}")?;
     let estimated = if shape.is_mesh() {
         ""
@@ -61,10 +62,10 @@ fn shape_info(shape: &Shape) -> Result<String> {
     };
     writeln!(text, "area         {:.6}{estimated}", shape.area()?)?;
     if shape.is_mesh() {
-        let closed = shape::mesh::EdgeSharing::of(&shape.vertices, &shape.triangles).is_closed();
+        let closed = EdgeSharing::of(&shape.mesh).is_closed();
         writeln!(text, "closed       {}", if closed { "yes" } else { "no" })?;
         if closed {
-            let volume = shape::mesh::signed_volume(&shape.vertices, &shape.triangles);
+            let volume = shape.mesh.volume();
             writeln!(text, "volume       {volume:.6}")?;
         }
     }

@@ -27,12 +27,12 @@ use clap::{Args, Parser, Subcommand};
 
 use crate::backend::{BackendError, BackendName};
 use crate::compare::PlanError;
+use crate::cubes::GridError;
 use crate::evaluate::TruthError;
 use crate::matching::MatchError;
 use crate::recipe::RecipeError;
 use crate::report::Verbosity;
 use crate::run_directory::RunError;
-use crate::surface::extract::GridError;
 
 /// Learns a continuous, physically plausible deformation between two 3D shapes.
 #[derive(Debug, Parser)]

@@ -9,8 +9,9 @@ use clap::Args;
 use serde::Serialize;
 
 use super::{Ending, Usage};
+use crate::formats::{SurfaceFormat, write_surface};
+use crate::geometry::Mesh;
 use crate::shape::{self, Shape, estimate_normals};
-use crate::surface::write::{SurfaceFormat, SurfaceView, write_surface};
 
 /// Estimate the normals of a point cloud, all pointing out of the shape, and write them with it
 ///
@@ -38,14 +39,14 @@ pub(super) fn run(args: NormalsArgs) -> Result<Ending> {
     let format = format_of(&args.output)?;
     let cloud = shape::read(&args.shape)?;
     let began = Instant::now();
-    let found = estimate_normals(&cloud.vertices);
+    let found = estimate_normals(&cloud.mesh.vertices);
     let seconds = began.elapsed().as_secs_f64();
-    let view = SurfaceView {
-        vertices: &cloud.vertices,
-        triangles: &[],
-        normals: Some(&found.normals),
+    let oriented = Mesh {
+        vertices: cloud.mesh.vertices.clone(),
+        triangles: Vec::new(),
+        normals: Some(found.normals.clone()),
     };
-    write_surface(view, &args.output, format)?;
+    write_surface(&oriented, &args.output, format)?;
     let share = |is: fn(f64) -> bool| {
         let count = found.certainty.iter().filter(|&&x| is(x)).count();
         count as f64 / found.certainty.len() as f64
@@ -92,7 +93,7 @@ struct AgainstOwn {
 
 /// Nothing if the file has no normals, or none with a direction.
 fn against_own(cloud: &Shape, estimated: &[[f32; 3]]) -> Option<AgainstOwn> {
-    let own = cloud.normals.as_ref()?.iter().zip(estimated);
+    let own = cloud.mesh.normals.as_ref()?.iter().zip(estimated);
     let directed = own.filter(|(own, _)| **own != [0.0; 3]);
     let cosine = |(a, b): (&[f32; 3], &[f32; 3])| -> f64 {
         a.iter().zip(b).map(|(a, b)| f64::from(a * b)).sum()

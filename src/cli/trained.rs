@@ -4,11 +4,11 @@ use anyhow::Result;
 use isomorph_model::TrainBackend;
 
 use super::Usage;
+use crate::geometry::Mesh;
 use crate::learner::checkpoint::Checkpoint;
 use crate::learner::method::{self, Method};
 use crate::recipe::{MethodName, Recipe};
 use crate::shape::{self, Bounds, Normalisation, Pair};
-use crate::surface::SurfaceMesh;
 use crate::surface::trained::{Surface, Trained};
 
 /// The frame of a pair of shapes: where the user's coordinates lie in the networks'.
@@ -58,7 +58,7 @@ pub(super) fn check(recipe: &Recipe, pair: &Pair) -> Result<()> {
 }
 
 /// The source's own mesh, normalised.
-fn template(recipe: &Recipe, normalisation: &Normalisation) -> Result<SurfaceMesh> {
+fn template(recipe: &Recipe, normalisation: &Normalisation) -> Result<Mesh<f32>> {
     let source = shape::read(&recipe.data.source)?;
     if !source.is_mesh() {
         let text = format!(
@@ -69,12 +69,7 @@ fn template(recipe: &Recipe, normalisation: &Normalisation) -> Result<SurfaceMes
         );
         return Err(Usage(text).into());
     }
-    let vertices = source.vertices.iter().map(|x| normalisation.apply(*x));
-    Ok(SurfaceMesh {
-        vertices: vertices.collect(),
-        triangles: source.triangles,
-        normals: None,
-    })
+    Ok(source.mesh.moved(|vertex| normalisation.apply(vertex)))
 }
 
 /// What a checkpoint holds.

@@ -10,6 +10,7 @@ use isomorph_model::{ModelBackend, TrainBackend};
 use super::trained;
 use super::{BackendArgs, Ending, even_times, stop_on_interrupt};
 use crate::backend::{self, Task};
+use crate::formats::SurfaceFormat;
 use crate::learner::checkpoint::Checkpoint;
 use crate::learner::event::Event;
 use crate::learner::{Learner, Outcome};
@@ -19,7 +20,6 @@ use crate::run_directory::RunDirectory;
 use crate::shape::Pair;
 use crate::surface::frames::{Frame, FrameOptions, write_frames};
 use crate::surface::trained::Trained;
-use crate::surface::write::SurfaceFormat;
 
 /// One run, from its first step or from a checkpoint.
 pub(super) struct Training {

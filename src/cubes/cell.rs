@@ -230,7 +230,7 @@ mod tests {
             let side = |a: usize, b: usize| {
                 std::array::from_fn(|axis| f64::from(points[b][axis] - points[a][axis]))
             };
-            let normal = super::super::cross(side(i, j), side(i, k));
+            let normal = crate::geometry::linear::cross(side(i, j), side(i, k));
             for (axis, part) in normal.into_iter().enumerate() {
                 let outwards = if corner >> axis & 1 == 0 { 1.0 } else { -1.0 };
                 assert!(part * outwards > 0.0, "corner {corner}: normal {normal:?}");

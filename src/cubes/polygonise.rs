@@ -9,11 +9,11 @@
 
 use rustc_hash::FxHashMap;
 
-use super::SurfaceMesh;
 use super::cell::{Loop, cut_into_triangles, lower_end, trace_loops};
-use super::extract::ExtractError;
+use super::grid::ExtractError;
 use super::lattice::{Node, pack};
 use super::search::{Search, corner};
+use crate::geometry::Mesh;
 
 /// Vertices keep this distance from grid nodes, in cells: at a node, those of all its crossed
 /// edges would coincide.
@@ -63,7 +63,7 @@ fn keep_off_nodes(along: f64) -> f64 {
 /// Makes the mesh of a finished search, and says whether it ends at the box.
 pub(super) fn polygonise<F, E>(
     search: &mut Search<'_, F>,
-) -> Result<(SurfaceMesh, bool), ExtractError<E>>
+) -> Result<(Mesh<f32>, bool), ExtractError<E>>
 where
     F: FnMut(&[[f32; 3]]) -> Result<Vec<f32>, E>,
 {
@@ -80,11 +80,7 @@ where
         .map(|(i, crossing)| ((pack(crossing.node), crossing.axis), i as u32))
         .collect();
     let vertices = placed(search, &crossings)?;
-    let mut mesh = SurfaceMesh {
-        vertices,
-        triangles: Vec::new(),
-        normals: None,
-    };
+    let mut mesh = Mesh::new(vertices, Vec::new());
     for (cell, _) in search.lattice.known() {
         if let Some(values) = mixed_corners(search, cell) {
             trace_loops(&values, |line| add_loop(&mut mesh, &index, cell, line));
@@ -138,7 +134,7 @@ fn mixed_corners<F>(search: &Search<'_, F>, cell: Node) -> Option<[f32; 8]> {
 }
 
 /// Adds the triangles of one loop.
-fn add_loop(mesh: &mut SurfaceMesh, index: &FxHashMap<(u64, usize), u32>, cell: Node, line: &Loop) {
+fn add_loop(mesh: &mut Mesh<f32>, index: &FxHashMap<(u64, usize), u32>, cell: Node, line: &Loop) {
     let vertex = |&edge: &u8| {
         let (offset, axis) = lower_end(edge);
         index[&(pack(std::array::from_fn(|i| cell[i] + offset[i])), axis)]

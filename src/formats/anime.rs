@@ -6,7 +6,9 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{Shape, ShapeError};
+use super::error::ShapeError;
+use super::shape::{Shape, file_length};
+use crate::geometry::Mesh;
 
 /// Bytes before the vertices.
 const HEADER: usize = 12;
@@ -30,7 +32,7 @@ impl Sequence {
     /// anything is allocated), a coordinate is not finite, a triangle refers to a vertex that does
     /// not exist.
     pub fn read(path: &Path) -> Result<Self, ShapeError> {
-        let length = super::file_length(path)?;
+        let length = file_length(path)?;
         let malformed = |problem: String| ShapeError::malformed(path, problem);
         let unreadable = |reason| ShapeError::Unreadable {
             path: path.to_owned(),
@@ -85,12 +87,7 @@ impl Sequence {
         };
         let shape = Shape {
             path: self.path.clone(),
-            vertices: vertices
-                .iter()
-                .map(|vertex| vertex.map(f64::from))
-                .collect(),
-            triangles: self.triangles.clone(),
-            normals: None,
+            mesh: Mesh::of_points(vertices, &self.triangles),
         };
         shape.checked()
     }
@@ -173,11 +170,15 @@ fn parse_frames(
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::shape::testing::tetrahedron;
+    use crate::geometry::testing::tetrahedron;
 
     /// A tetrahedron in two frames, the second moved by (0, 0, 0.5).
     pub fn two_frames() -> Vec<u8> {
-        let (vertices, triangles) = tetrahedron(0.0);
+        let Mesh {
+            vertices,
+            triangles,
+            ..
+        } = tetrahedron(0.0);
         let mut bytes = Vec::new();
         for count in [2, vertices.len() as i32, triangles.len() as i32] {
             bytes.extend(count.to_le_bytes());
@@ -215,8 +216,8 @@ pub(super) mod tests {
         let sequence = read_bytes(&two_frames()).expect("read");
         assert_eq!(sequence.frames.len(), 2);
         let shape = sequence.shape(1).expect("a frame");
-        assert_eq!(shape.vertices[3], [0.0, 0.0, 1.5]);
-        assert_eq!(shape.triangles, tetrahedron(0.0).1);
+        assert_eq!(shape.mesh.vertices[3], [0.0, 0.0, 1.5]);
+        assert_eq!(shape.mesh.triangles, tetrahedron(0.0).triangles);
         let refused = sequence.shape(2).expect_err("no such frame").to_string();
         assert!(
             refused.contains("frame 2 (the sequence has frames 0 to 1)"),

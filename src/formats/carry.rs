@@ -13,10 +13,12 @@ use ply_rs::ply::{
 };
 use ply_rs::writer::Writer;
 
+use super::error::ShapeError;
+use super::obj::{Corner, Counts, parse_corner, statements, words};
+use super::ply::PlyFile;
+use super::read::read;
+use super::shape::Shape;
 use crate::atomic::write_atomically;
-use crate::shape::obj::{Corner, Counts, parse_corner, statements, words};
-use crate::shape::ply::PlyFile;
-use crate::shape::{self, Shape, ShapeError, mesh};
 
 /// The properties of a vertex that hold its position.
 const POSITION: [&str; 3] = ["x", "y", "z"];
@@ -68,7 +70,7 @@ pub enum CarryError {
 
 /// Writes `original` again to `out`, its vertices at `positions` and all else as it was.
 ///
-/// `positions` are in the user's coordinates and in the order in which [`shape::read`] gives the
+/// `positions` are in the user's coordinates and in the order in which [`read`] gives the
 /// vertices. `out` may be the original's own name. PLY keeps its encoding and the types of its
 /// coordinates, except that whole numbers become float64.
 ///
@@ -90,9 +92,9 @@ pub fn rewrite_vertices(
             needed,
         });
     }
-    let shape = shape::read(original)?;
-    if positions.len() != shape.vertices.len() {
-        let (found, needed) = (positions.len(), shape.vertices.len());
+    let mut shape = read(original)?;
+    if positions.len() != shape.mesh.vertices.len() {
+        let (found, needed) = (positions.len(), shape.mesh.vertices.len());
         return Err(CarryError::Count {
             path: original.to_owned(),
             found,
@@ -108,11 +110,12 @@ pub fn rewrite_vertices(
             position,
         });
     }
-    // `shape::read` refuses whatever is neither.
+    shape.mesh.vertices = positions.to_vec();
+    // `read` refuses whatever is neither.
     if needed == "ply" {
-        rewrite_ply(&shape, positions, out)
+        rewrite_ply(&shape, out)
     } else {
-        rewrite_obj(&shape, positions, out)
+        rewrite_obj(&shape, out)
     }
 }
 
@@ -124,11 +127,11 @@ fn extension(path: &Path) -> String {
         .to_ascii_lowercase()
 }
 
-/// Element by element, so that a file of any size passes through in little memory.
-fn rewrite_ply(shape: &Shape, positions: &[[f64; 3]], out: &Path) -> Result<(), CarryError> {
+/// `shape` is the original with its vertices moved. Element by element, so that a file of any size passes through in little memory.
+fn rewrite_ply(shape: &Shape, out: &Path) -> Result<(), CarryError> {
+    let mesh = &shape.mesh;
     let mut file = PlyFile::open(&shape.path)?;
-    let normals = (shape.normals.is_some() && shape.is_mesh())
-        .then(|| mesh::vertex_normals(positions, &shape.triangles));
+    let normals = (mesh.normals.is_some() && shape.is_mesh()).then(|| mesh.vertex_normals());
     let header = moved_header(&file.header, normals.is_some());
     let write = |mut out: &mut dyn Write| -> io::Result<()> {
         let writer = Writer::<DefaultElement>::new();
@@ -137,7 +140,7 @@ fn rewrite_ply(shape: &Shape, positions: &[[f64; 3]], out: &Path) -> Result<(), 
         let read = file.for_each::<DefaultElement>(|element, index, mut row| {
             let element = &header.elements[&element.name];
             if element.name == "vertex" {
-                replace(&mut row, element, POSITION, positions[index]);
+                replace(&mut row, element, POSITION, mesh.vertices[index]);
                 if let Some(normals) = &normals {
                     replace(&mut row, element, NORMAL, normals[index].map(f64::from));
                 }
@@ -201,14 +204,15 @@ fn replace(row: &mut DefaultElement, element: &ElementDef, names: [&str; 3], val
 }
 
 /// Line by line: what is not a vertex, a normal or a face is copied byte for byte.
-fn rewrite_obj(shape: &Shape, positions: &[[f64; 3]], out: &Path) -> Result<(), CarryError> {
+fn rewrite_obj(shape: &Shape, out: &Path) -> Result<(), CarryError> {
+    let mesh = &shape.mesh;
     let unreadable = |reason| ShapeError::Unreadable {
         path: shape.path.clone(),
         reason,
     };
     let bytes = std::fs::read(&shape.path).map_err(unreadable)?;
-    let normals = normals_are_those_of_vertices(&bytes, positions.len())
-        .then(|| mesh::vertex_normals(positions, &shape.triangles));
+    let normals =
+        normals_are_those_of_vertices(&bytes, mesh.vertices.len()).then(|| mesh.vertex_normals());
     let write = |out: &mut dyn Write| -> io::Result<()> {
         let mut counts = Counts::default();
         for (line, (keyword, rest)) in bytes
@@ -217,7 +221,7 @@ fn rewrite_obj(shape: &Shape, positions: &[[f64; 3]], out: &Path) -> Result<(), 
         {
             match keyword {
                 b"v" => {
-                    let position = positions.get(counts.vertices).ok_or_else(changed)?;
+                    let position = mesh.vertices.get(counts.vertices).ok_or_else(changed)?;
                     write_numbers(out, line, *position)?;
                     counts.vertices += 1;
                 }

@@ -4,7 +4,9 @@
 use std::io;
 use std::path::PathBuf;
 
-use super::FEWEST_POINTS;
+/// The least number of points that a cloud, or a sample of a mesh, may have: fewer say too little
+/// about a surface, and leave nothing to estimate normals and areas from.
+pub const FEWEST_POINTS: usize = 64;
 
 /// Why shapes could not be read or made into a pair. Vertices, faces and frames count from 0.
 #[derive(Debug, thiserror::Error)]
@@ -168,7 +170,7 @@ impl ShapeError {
     }
 
     /// A [`ShapeError::Line`] in the file at `path`, line counted from 1.
-    pub(super) fn line(path: &std::path::Path, line: usize, problem: impl Into<String>) -> Self {
+    pub(crate) fn line(path: &std::path::Path, line: usize, problem: impl Into<String>) -> Self {
         Self::Line {
             path: path.to_owned(),
             line,

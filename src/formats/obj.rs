@@ -9,7 +9,10 @@
 
 use std::path::Path;
 
-use super::{Shape, ShapeError};
+use super::error::ShapeError;
+use super::shape::{Shape, file_length};
+use crate::geometry::Mesh;
+use crate::geometry::linear::unit;
 
 /// How OBJ counts, for messages.
 const BASE: &str = " up to that line, counted from 1, or back from -1";
@@ -58,7 +61,7 @@ pub fn words(rest: &[u8]) -> impl Iterator<Item = std::borrow::Cow<'_, str>> {
 
 /// Reads the geometry of an OBJ file.
 pub(super) fn read(path: &Path) -> Result<Shape, ShapeError> {
-    super::file_length(path)?;
+    file_length(path)?;
     let unreadable = |reason| ShapeError::Unreadable {
         path: path.to_owned(),
         reason,
@@ -71,7 +74,7 @@ pub(super) fn read(path: &Path) -> Result<Shape, ShapeError> {
         let here = |problem| ShapeError::line(path, at + 1, problem);
         match keyword {
             b"v" => vertices.push(parse_vector(rest).map_err(here)?),
-            b"vn" => vertex_normals.push(super::unit(parse_vector(rest).map_err(here)?)),
+            b"vn" => vertex_normals.push(unit(parse_vector(rest).map_err(here)?)),
             b"f" => {
                 let counts = Counts {
                     vertices: vertices.len(),
@@ -112,9 +115,11 @@ pub(super) fn read(path: &Path) -> Result<Shape, ShapeError> {
     };
     Ok(Shape {
         path: path.to_owned(),
-        vertices,
-        triangles,
-        normals,
+        mesh: Mesh {
+            vertices,
+            triangles,
+            normals,
+        },
     })
 }
 
@@ -262,7 +267,7 @@ impl Polygons {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::shape;
+    use crate::formats;
 
     /// Two groups, a quad and a pentagon, negative indices, a comment, an unused vertex first.
     pub const HOUSE: &str = "\
@@ -274,7 +279,7 @@ v 0 1 1\nv .5 1 1.5e0\nv 1 1 1\nf -5//1 -4//1 -1 -2 -3\n";
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = folder.path().join("house.OBJ");
         std::fs::write(&path, text).expect("written");
-        shape::read(&path)
+        formats::read(&path)
     }
 
     fn message(text: &str) -> String {
@@ -284,12 +289,12 @@ v 0 1 1\nv .5 1 1.5e0\nv 1 1 1\nf -5//1 -4//1 -1 -2 -3\n";
     #[test]
     fn groups_become_one_shape_in_the_order_of_the_file() {
         let house = read_text(HOUSE).expect("read");
-        assert_eq!(house.vertices.len(), 8);
-        assert_eq!(house.vertices[0], [9.0; 3]);
-        assert_eq!(house.vertices[6], [0.5, 1.0, 1.5]);
+        assert_eq!(house.mesh.vertices.len(), 8);
+        assert_eq!(house.mesh.vertices[0], [9.0; 3]);
+        assert_eq!(house.mesh.vertices[6], [0.5, 1.0, 1.5]);
         let expected = [[1, 2, 3], [1, 3, 4], [3, 4, 7], [3, 7, 6], [3, 6, 5]];
-        assert_eq!(house.triangles, expected);
-        assert_eq!(house.normals, None, "not every vertex has one");
+        assert_eq!(house.mesh.triangles, expected);
+        assert_eq!(house.mesh.normals, None, "not every vertex has one");
     }
 
     #[test]
@@ -320,20 +325,25 @@ v 0 1 1\nv .5 1 1.5e0\nv 1 1 1\nf -5//1 -4//1 -1 -2 -3\n";
         }
         let house = read_text(HOUSE).expect("read");
         let ours = house
+            .mesh
             .triangles
             .iter()
             .flatten()
-            .map(|&index| house.vertices[index as usize]);
+            .map(|&index| house.mesh.vertices[index as usize]);
         assert_eq!(ours.collect::<Vec<_>>(), theirs);
     }
 
     #[test]
     fn normals_are_kept_where_each_vertex_has_one() {
         let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 5\nvn 0 0 0\nf 1//1 2//2 3//1\n";
-        let normals = read_text(text).expect("read").normals.expect("normals");
+        let normals = read_text(text)
+            .expect("read")
+            .mesh
+            .normals
+            .expect("normals");
         assert_eq!(normals, [[0.0, 0.0, 1.0], [0.0; 3], [0.0, 0.0, 1.0]]);
         let two = text.replace("f 1//1 2//2 3//1", "f 1//1 2//2 3//1\nf 1//2 2//2 3//1");
-        assert_eq!(read_text(&two).expect("read").normals, None);
+        assert_eq!(read_text(&two).expect("read").mesh.normals, None);
     }
 
     #[test]

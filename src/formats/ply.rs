@@ -14,7 +14,10 @@ use ply_rs::ply::{
     ElementDef, Encoding, Header, PropertyAccess, PropertyAccessResult, PropertyType, ScalarType,
 };
 
-use super::{Shape, ShapeError};
+use super::error::ShapeError;
+use super::shape::{Shape, file_length, push_fan};
+use crate::geometry::Mesh;
+use crate::geometry::linear::unit;
 
 /// The names that hold a face's corners.
 const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
@@ -36,7 +39,7 @@ impl<'a> PlyFile<'a> {
     /// A file that cannot be read or is empty, a malformed header, or one whose counts need more
     /// bytes than the file has.
     pub fn open(path: &'a Path) -> Result<Self, ShapeError> {
-        let length = super::file_length(path)?;
+        let length = file_length(path)?;
         let unreadable = |reason| ShapeError::Unreadable {
             path: path.to_owned(),
             reason,
@@ -153,7 +156,7 @@ pub(super) fn read(path: &Path) -> Result<Shape, ShapeError> {
             "vertex" => {
                 vertices.push(row.position);
                 if with_normals {
-                    normals.push(super::unit(row.normal));
+                    normals.push(unit(row.normal));
                 }
             }
             "face" => {
@@ -170,7 +173,7 @@ pub(super) fn read(path: &Path) -> Result<Shape, ShapeError> {
                         base: "",
                     })?);
                 }
-                super::push_fan(&mut triangles, &corners);
+                push_fan(&mut triangles, &corners);
             }
             _ => {}
         }
@@ -179,9 +182,11 @@ pub(super) fn read(path: &Path) -> Result<Shape, ShapeError> {
     let normals = with_normals.then_some(normals);
     Ok(Shape {
         path: path.to_owned(),
-        vertices,
-        triangles,
-        normals,
+        mesh: Mesh {
+            vertices,
+            triangles,
+            normals,
+        },
     })
 }
 

@@ -16,6 +16,7 @@ use ply_rs::ply::{
 use ply_rs::writer::Writer;
 
 use crate::atomic::write_atomically;
+use crate::geometry::Mesh;
 
 /// Coordinates this many times larger than the shape are written as 64-bit numbers.
 const LARGEST_FOR_F32: f64 = 100.0;
@@ -40,17 +41,6 @@ impl SurfaceFormat {
             Self::Obj => "obj",
         }
     }
-}
-
-/// A surface in the user's coordinates, borrowed for writing.
-#[derive(Clone, Copy, Debug)]
-pub struct SurfaceView<'a> {
-    /// Vertex positions.
-    pub vertices: &'a [[f64; 3]],
-    /// Vertex indices, counter-clockwise seen from outside.
-    pub triangles: &'a [[u32; 3]],
-    /// Unit normals, one per vertex, if any.
-    pub normals: Option<&'a [[f32; 3]]>,
 }
 
 /// A surface that cannot be written.
@@ -98,33 +88,30 @@ pub enum WriteError {
     Io(#[from] io::Error),
 }
 
-/// Writes a surface under its final name, whole or not at all.
+/// Writes a mesh in the user's coordinates under its final name, whole or not at all.
 ///
 /// # Errors
 /// Indices out of range, normals that do not match, coordinates that are not finite, or the file
 /// system's errors; in all cases `path` keeps what it held before.
 pub fn write_surface(
-    surface: SurfaceView<'_>,
+    surface: &Mesh<f64>,
     path: &Path,
     format: SurfaceFormat,
 ) -> Result<(), WriteError> {
-    check(&surface, path)?;
-    let wide = needs_f64(surface.vertices);
+    check(surface, path)?;
+    let wide = needs_f64(&surface.vertices);
     write_atomically(path, |out| match format {
-        SurfaceFormat::Ply => write_ply(&surface, wide, out),
-        SurfaceFormat::Obj => write_obj(&surface, wide, out),
+        SurfaceFormat::Ply => write_ply(surface, wide, out),
+        SurfaceFormat::Obj => write_obj(surface, wide, out),
     })?;
     Ok(())
 }
 
-fn check(surface: &SurfaceView<'_>, path: &Path) -> Result<(), WriteError> {
+fn check(surface: &Mesh<f64>, path: &Path) -> Result<(), WriteError> {
     let path = || path.display().to_string();
     let vertices = surface.vertices.len();
-    if let Some(normals) = surface
-        .normals
-        .map(<[_]>::len)
-        .filter(|&normals| normals != vertices)
-    {
+    let normals = surface.normals.as_ref().map(Vec::len);
+    if let Some(normals) = normals.filter(|&normals| normals != vertices) {
         return Err(WriteError::Normals {
             path: path(),
             normals,
@@ -201,7 +188,7 @@ impl PropertyAccess for Row {
     }
 }
 
-fn write_ply(surface: &SurfaceView<'_>, wide: bool, mut out: &mut dyn Write) -> io::Result<()> {
+fn write_ply(surface: &Mesh<f64>, wide: bool, mut out: &mut dyn Write) -> io::Result<()> {
     let [vertex, face] = elements(surface, wide);
     let mut header = Header::new();
     header.encoding = Encoding::BinaryLittleEndian;
@@ -213,10 +200,13 @@ fn write_ply(surface: &SurfaceView<'_>, wide: bool, mut out: &mut dyn Write) -> 
     let mut row = Row::default();
     for (i, &position) in surface.vertices.iter().enumerate() {
         row.position = position;
-        row.normal = surface.normals.map_or([0.0; 3], |normals| normals[i]);
+        row.normal = surface
+            .normals
+            .as_ref()
+            .map_or([0.0; 3], |normals| normals[i]);
         writer.write_little_endian_element(&mut out, &row, &vertex)?;
     }
-    for triangle in surface.triangles {
+    for triangle in &surface.triangles {
         // Indices are below the number of vertices, and 2^31 of those would fill 48 GiB.
         row.corners = triangle.map(|vertex| vertex as i32);
         writer.write_little_endian_element(&mut out, &row, &face)?;
@@ -225,7 +215,7 @@ fn write_ply(surface: &SurfaceView<'_>, wide: bool, mut out: &mut dyn Write) -> 
 }
 
 /// The definitions of vertices and faces.
-fn elements(surface: &SurfaceView<'_>, wide: bool) -> [ElementDef; 2] {
+fn elements(surface: &Mesh<f64>, wide: bool) -> [ElementDef; 2] {
     let define = |name: &str, count: usize, properties: Vec<(&str, PropertyType)>| {
         let mut element = ElementDef::new(name.into());
         element.count = count;
@@ -261,9 +251,9 @@ fn elements(surface: &SurfaceView<'_>, wide: bool) -> [ElementDef; 2] {
     ]
 }
 
-fn write_obj(surface: &SurfaceView<'_>, wide: bool, out: &mut dyn Write) -> io::Result<()> {
+fn write_obj(surface: &Mesh<f64>, wide: bool, out: &mut dyn Write) -> io::Result<()> {
     writeln!(out, "# written by isomorph")?;
-    for &[x, y, z] in surface.vertices {
+    for &[x, y, z] in &surface.vertices {
         if wide {
             writeln!(out, "v {x} {y} {z}")?;
         } else {
@@ -271,7 +261,7 @@ fn write_obj(surface: &SurfaceView<'_>, wide: bool, out: &mut dyn Write) -> io::
             writeln!(out, "v {} {} {}", x as f32, y as f32, z as f32)?;
         }
     }
-    for [x, y, z] in surface.normals.into_iter().flatten() {
+    for [x, y, z] in surface.normals.iter().flatten() {
         writeln!(out, "vn {x} {y} {z}")?;
     }
     for [a, b, c] in surface
@@ -289,5 +279,4 @@ fn write_obj(surface: &SurfaceView<'_>, wide: bool, out: &mut dyn Write) -> io::
 }
 
 #[cfg(test)]
-#[path = "write_tests.rs"]
 mod tests;

@@ -2,8 +2,9 @@
 //!
 //! Extraction keeps every piece; a filter is the user's choice.
 
-use super::SurfaceMesh;
-use crate::shape::connected::Connected;
+use super::connected::Connected;
+use super::linear::Scalar;
+use super::mesh::Mesh;
 
 /// A connected piece of a mesh.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,7 +15,7 @@ pub struct Component {
     pub area: f64,
 }
 
-impl SurfaceMesh {
+impl<T: Scalar> Mesh<T> {
     /// The connected pieces, largest area first; triangles that share a vertex are connected.
     #[must_use]
     pub fn components(&self) -> Vec<Component> {
@@ -73,14 +74,17 @@ impl SurfaceMesh {
         for (new, &vertex) in old.iter().enumerate() {
             renumbered[vertex] = new as u32;
         }
-        let pick = |values: &Vec<[f32; 3]>| old.iter().map(|&vertex| values[vertex]).collect();
         let renumber = |i: usize| self.triangles[i].map(|vertex| renumbered[vertex as usize]);
         Self {
-            vertices: pick(&self.vertices),
+            vertices: picked(&self.vertices, &old),
             triangles: kept.into_iter().map(renumber).collect(),
-            normals: self.normals.as_ref().map(pick),
+            normals: self.normals.as_ref().map(|all| picked(all, &old)),
         }
     }
+}
+
+fn picked<V: Copy>(all: &[V], which: &[usize]) -> Vec<V> {
+    which.iter().map(|&k| all[k]).collect()
 }
 
 #[cfg(test)]
@@ -89,10 +93,10 @@ mod tests {
 
     /// Right triangles with legs of these lengths, apart from each other, two vertices swapped
     /// in so that pieces are interleaved, and one vertex that nothing uses.
-    fn scattered(legs: &[f32]) -> SurfaceMesh {
-        let mut mesh = SurfaceMesh {
+    fn scattered(legs: &[f32]) -> Mesh<f32> {
+        let mut mesh = Mesh {
             vertices: vec![[9.0; 3]],
-            ..SurfaceMesh::default()
+            ..Mesh::default()
         };
         for (i, &leg) in legs.iter().enumerate() {
             let (at, first) = (10.0 * i as f32, mesh.vertices.len() as u32);
@@ -144,8 +148,8 @@ mod tests {
 
     #[test]
     fn an_empty_mesh_has_no_pieces() {
-        assert!(SurfaceMesh::default().components().is_empty());
-        let kept = SurfaceMesh::default().keep_at_least(0.1);
-        assert_eq!(kept, (SurfaceMesh::default(), 0, 0));
+        assert!(Mesh::<f32>::default().components().is_empty());
+        let kept = Mesh::<f32>::default().keep_at_least(0.1);
+        assert_eq!(kept, (Mesh::<f32>::default(), 0, 0));
     }
 }

@@ -97,11 +97,11 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
-    use crate::shape::mesh;
+    use crate::geometry::linear::{difference, dot};
 
     fn squared(a: [f64; 3], b: [f64; 3]) -> f64 {
-        let d = mesh::difference(a, b);
-        mesh::dot(d, d)
+        let d = difference(a, b);
+        dot(d, d)
     }
 
     /// Distances of the nearest by looking at every point.

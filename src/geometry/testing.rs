@@ -1,15 +1,35 @@
-//! Shapes that the tests of this module share.
+//! Shapes that tests share.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+use super::mesh::Mesh;
+
 /// The corner of the unit cube, wound outwards, moved by `offset` along every axis.
-pub fn tetrahedron(offset: f64) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
+pub fn tetrahedron(offset: f64) -> Mesh<f64> {
     let corners = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let vertices = corners
         .map(|corner| corner.map(|x: f64| x + offset))
         .to_vec();
-    (vertices, vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    Mesh::new(vertices, vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+}
+
+/// A box with these edges and a corner at the origin, wound outwards.
+pub fn cuboid(edges: [f64; 3]) -> Mesh<f64> {
+    let corner = |i: usize| [0, 1, 2].map(|axis| edges[axis] * (i >> axis & 1) as f64);
+    let faces = [
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+    ];
+    let halves = |&[a, b, c, d]: &[u32; 4]| [[a, b, c], [a, c, d]];
+    Mesh::new(
+        (0..8).map(corner).collect(),
+        faces.iter().flat_map(halves).collect(),
+    )
 }
 
 /// Points uniform on the sphere of this radius about the origin.

@@ -17,41 +17,16 @@
 //! disc is no longer flat to the eye; the paper sums without.
 
 use std::f64::consts::PI;
-use std::num::NonZeroUsize;
 
-use super::{Neighbour, NeighbourSearch, mesh};
+use super::density::{NEIGHBOURS, areas};
+use super::linear::{difference, dot, mean};
+use super::neighbours::NeighbourSearch;
 
 /// Points in a leaf.
 const LEAF: usize = 16;
 
 /// How many of its radii away a group counts as one disc.
 const FAR: f64 = 3.0;
-
-/// Neighbours that a point's area is estimated from: few, so that the other side of a thin part is
-/// not among them.
-const AREA_NEIGHBOURS: usize = 6;
-
-/// As many as that takes: every point finds itself first.
-pub const NEIGHBOURS: NonZeroUsize = NonZeroUsize::new(AREA_NEIGHBOURS + 1).expect("more than 0");
-
-/// The neighbour whose distance is the spacing of the points.
-const SPACING: usize = 3;
-
-/// The squared spacing about a point whose neighbours, itself first, are these.
-pub fn squared_spacing(found: &[Neighbour]) -> f64 {
-    found[SPACING.min(found.len() - 1)].squared_distance
-}
-
-/// The area that each point stands for: `pi r_k^2 / k` with its k-th neighbour at `r_k`, k = 6.
-///
-/// `neighbours` are those of each point, itself first; fewer than k are taken as they are.
-pub fn areas(neighbours: &[Vec<Neighbour>]) -> Vec<f64> {
-    let area = |found: &Vec<Neighbour>| {
-        let k = AREA_NEIGHBOURS.min(found.len() - 1);
-        PI * found[k].squared_distance / k.max(1) as f64
-    };
-    neighbours.iter().map(area).collect()
-}
 
 /// Whether the normals of a cloud point into it on the whole: whether the volume that its points
 /// enclose as small discs, `sum_j a_j n_j . (p_j - centre) / 3`, is negative.
@@ -60,12 +35,12 @@ pub fn areas(neighbours: &[Vec<Neighbour>]) -> Vec<f64> {
 /// If there are no points.
 pub fn is_inside_out(points: &[[f64; 3]], normals: &[[f32; 3]]) -> bool {
     let neighbours = NeighbourSearch::new(points).nearest_of_each(points, NEIGHBOURS);
-    let centre = mesh::mean(points.iter().copied());
+    let centre = mean(points.iter().copied());
     let discs = areas(&neighbours)
         .into_iter()
         .zip(points.iter().zip(normals));
     let volume = discs.map(|(area, (&point, normal))| {
-        area * mesh::dot(mesh::difference(point, centre), normal.map(f64::from))
+        area * dot(difference(point, centre), normal.map(f64::from))
     });
     volume.sum::<f64>() < 0.0
 }
@@ -147,8 +122,8 @@ impl SummationTree {
     pub fn winding(&self, dipoles: &Charges<3>, x: [f64; 3]) -> f64 {
         let sum = std::cell::Cell::new(0.0);
         let add = |dipole: [f64; 3], place: [f64; 3], softening: f64| {
-            let away = mesh::difference(place, x);
-            sum.set(sum.get() + mesh::dot(dipole, away) * fall_off(away, softening));
+            let away = difference(place, x);
+            sum.set(sum.get() + dot(dipole, away) * fall_off(away, softening));
         };
         self.visit(
             x,
@@ -158,12 +133,17 @@ impl SummationTree {
         sum.get()
     }
 
-    /// The adjoint of [`Self::winding`]: how the sum of `charges` times the winding numbers about
-    /// the points changes with the dipole of a disc at `x` with this squared softening length.
+    /// How the sum of `charges` times the winding numbers about the points changes with the dipole of a
+    /// disc at `x` with this squared softening length.
+    ///
+    /// It is the adjoint of [`Self::winding`] but for two approximations. [`Self::winding`] sees a far
+    /// group of dipoles as one without softening, here a far group of charges is one and the disc
+    /// keeps its own softening: they differ by about 1.5 `(softening length / distance)^2`, beyond
+    /// three radii of the group. And which points form one group differs between the two.
     pub fn pull(&self, charges: &Charges<1>, x: [f64; 3], softening: f64) -> [f64; 3] {
         let sum = std::cell::Cell::new([0.0; 3]);
         let add = |[charge]: [f64; 1], place: [f64; 3]| {
-            let away = mesh::difference(x, place);
+            let away = difference(x, place);
             let strength = charge * fall_off(away, softening);
             let so_far = sum.get();
             sum.set([0, 1, 2].map(|axis| so_far[axis] + strength * away[axis]));
@@ -180,8 +160,8 @@ impl SummationTree {
     fn visit(&self, x: [f64; 3], far: impl Fn(usize), near: impl Fn(usize)) {
         let mut next = 0;
         while let Some(node) = self.nodes.get(next) {
-            let away = mesh::difference(node.centre, x);
-            if mesh::dot(away, away) > node.far {
+            let away = difference(node.centre, x);
+            if dot(away, away) > node.far {
                 far(next);
                 next = node.after as usize;
             } else if node.after as usize == next + 1 {
@@ -196,7 +176,7 @@ impl SummationTree {
 
 /// `1 / (4 pi (r^2 + s^2)^(3/2))`, and nothing at the point itself.
 fn fall_off(away: [f64; 3], softening: f64) -> f64 {
-    let squared = mesh::dot(away, away) + softening;
+    let squared = dot(away, away) + softening;
     if squared > 0.0 {
         1.0 / (4.0 * PI * squared * squared.sqrt())
     } else {
@@ -208,11 +188,11 @@ fn fall_off(away: [f64; 3], softening: f64) -> f64 {
 /// them along their longest side.
 fn split(points: &[[f64; 3]], order: &mut [u32], begin: usize, nodes: &mut Vec<Node>) {
     let of = |&k: &u32| points[k as usize];
-    let centre = mesh::mean(order.iter().map(of));
+    let centre = mean(order.iter().map(of));
     let (mut radius, mut reach) = (0.0_f64, [0.0_f64; 3]);
     for point in order.iter().map(of) {
-        let away = mesh::difference(point, centre);
-        radius = radius.max(mesh::dot(away, away));
+        let away = difference(point, centre);
+        radius = radius.max(dot(away, away));
         reach = [0, 1, 2].map(|axis| reach[axis].max(away[axis].abs()));
     }
     let place = nodes.len();
@@ -243,7 +223,8 @@ fn split(points: &[[f64; 3]], order: &mut [u32], begin: usize, nodes: &mut Vec<N
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shape::testing::{sphere_cloud, torus_cloud};
+    use crate::geometry::density::squared_spacing;
+    use crate::geometry::testing::{sphere_cloud, torus_cloud};
 
     /// Points with normals, arranged, with their areas and softening lengths.
     fn arranged(points: &[[f64; 3]]) -> (SummationTree, Vec<f64>, Vec<f64>) {
@@ -295,16 +276,16 @@ mod tests {
             let mut winding = 0.0;
             let mut pull = [0.0; 3];
             for k in 0..points.len() {
-                let away = mesh::difference(points[k], x);
-                winding += mesh::dot(dipoles[k], away) * fall_off(away, softening[k]);
+                let away = difference(points[k], x);
+                winding += dot(dipoles[k], away) * fall_off(away, softening[k]);
                 let strength = charges[k][0] * fall_off(away, 0.0);
                 pull = [0, 1, 2].map(|axis| pull[axis] - strength * away[axis]);
             }
             let found = tree.winding(&by_dipole, x);
             assert!((found - winding).abs() < 0.01, "{found}, not {winding}");
             let found = tree.pull(&by_charge, x, 0.0);
-            let off = mesh::difference(found, pull);
-            assert!(mesh::dot(off, off) < 1e-4, "{found:?}, not {pull:?}");
+            let off = difference(found, pull);
+            assert!(dot(off, off) < 1e-4, "{found:?}, not {pull:?}");
         }
     }
 

@@ -16,9 +16,9 @@
 //! robust function `rho^2 s^2 / (rho^2 + s^2)` of Geman and McClure (1985), minimised by
 //! reweighting.
 
-use super::rotation::{Matrix, add, add_outer, nearest_rotation, scaled, times};
+use super::rotation::nearest_rotation;
 use super::surface::NodeMotion;
-use crate::shape::mesh;
+use crate::geometry::linear::{Matrix, add, add_outer, difference, dot, length, scaled, times};
 
 /// The least weight of a tie: even a joint holds together.
 const LEAST_WEIGHT: f64 = 1e-3;
@@ -87,7 +87,7 @@ impl ElasticNodes {
     /// `y_i - y_j` turned as the ends of the tie are.
     fn turned(&self, [i, j]: [u32; 2]) -> [f64; 3] {
         let (i, j) = (i as usize, j as usize);
-        let along = mesh::difference(self.rest[i], self.rest[j]);
+        let along = difference(self.rest[i], self.rest[j]);
         let turns = &self.motion.rotations;
         scaled(add(times(&turns[i], along), times(&turns[j], along)), 0.5)
     }
@@ -96,10 +96,10 @@ impl ElasticNodes {
         let weight = |&tie: &[u32; 2]| {
             let [i, j] = tie.map(|node| self.motion.places[node as usize]);
             let turned = self.turned(tie);
-            let stretch = mesh::difference(mesh::difference(i, j), turned);
+            let stretch = difference(difference(i, j), turned);
             let [from, to] = tie.map(|node| self.rest[node as usize]);
-            let length = mesh::difference(from, to);
-            let square = mesh::dot(stretch, stretch) / mesh::dot(length, length);
+            let length = difference(from, to);
+            let square = dot(stretch, stretch) / dot(length, length);
             (1.0 + square / (give * give)).powi(-2).max(LEAST_WEIGHT)
         };
         self.weights = self.ties.iter().map(weight).collect();
@@ -110,13 +110,13 @@ impl ElasticNodes {
         let places = &self.motion.places;
         for (&[i, j], &weight) in self.ties.iter().zip(&self.weights) {
             let (i, j) = (i as usize, j as usize);
-            let now = mesh::difference(places[i], places[j]);
-            let then = mesh::difference(self.rest[i], self.rest[j]);
+            let now = difference(places[i], places[j]);
+            let then = difference(self.rest[i], self.rest[j]);
             add_outer(&mut moments[i], weight, now, then);
             add_outer(&mut moments[j], weight, now, then);
         }
         for (turn, mut moment) in self.motion.rotations.iter_mut().zip(moments) {
-            let size = mesh::length(moment.map(mesh::length));
+            let size = length(moment.map(length));
             for row in 0..3 {
                 moment[row] = add(moment[row], scaled(turn[row], KEPT_TURN * size));
             }
@@ -143,7 +143,7 @@ impl ElasticNodes {
             let turned = scaled(self.turned(tie), stiffness * weight);
             let [i, j] = tie.map(|node| node as usize);
             wanted[i] = add(wanted[i], turned);
-            wanted[j] = mesh::difference(wanted[j], turned);
+            wanted[j] = difference(wanted[j], turned);
             for node in [i, j] {
                 diagonal[node] = diagonal[node].map(|part| part + stiffness * weight);
             }
@@ -163,9 +163,9 @@ impl ElasticNodes {
             .collect();
         for (&[i, j], &weight) in self.ties.iter().zip(&self.weights) {
             let (i, j) = (i as usize, j as usize);
-            let force = scaled(mesh::difference(z[i], z[j]), stiffness * weight);
+            let force = scaled(difference(z[i], z[j]), stiffness * weight);
             forces[i] = add(forces[i], force);
-            forces[j] = mesh::difference(forces[j], force);
+            forces[j] = difference(forces[j], force);
         }
         forces
     }
@@ -179,9 +179,8 @@ fn conjugate_gradients(
     diagonal: &[[f64; 3]],
     x: &mut [[f64; 3]],
 ) {
-    let product = |a: &[[f64; 3]], b: &[[f64; 3]]| -> f64 {
-        a.iter().zip(b).map(|(a, b)| mesh::dot(*a, *b)).sum()
-    };
+    let product =
+        |a: &[[f64; 3]], b: &[[f64; 3]]| -> f64 { a.iter().zip(b).map(|(a, b)| dot(*a, *b)).sum() };
     let precondition = |r: &[[f64; 3]]| -> Vec<[f64; 3]> {
         let divide = |(r, d): (&[f64; 3], &[f64; 3])| {
             [0, 1, 2].map(|k| if d[k] > 0.0 { r[k] / d[k] } else { 0.0 })
@@ -191,7 +190,7 @@ fn conjugate_gradients(
     let mut residual: Vec<[f64; 3]> = b
         .iter()
         .zip(apply(x))
-        .map(|(b, ax)| mesh::difference(*b, ax))
+        .map(|(b, ax)| difference(*b, ax))
         .collect();
     let mut conditioned = precondition(&residual);
     let mut direction = conditioned.clone();
@@ -209,7 +208,7 @@ fn conjugate_gradients(
         let step = slope / curvature;
         for k in 0..x.len() {
             x[k] = add(x[k], scaled(direction[k], step));
-            residual[k] = mesh::difference(residual[k], scaled(applied[k], step));
+            residual[k] = difference(residual[k], scaled(applied[k], step));
         }
         conditioned = precondition(&residual);
         let next = product(&residual, &conditioned);
@@ -222,8 +221,9 @@ fn conjugate_gradients(
 
 #[cfg(test)]
 mod tests {
-    use super::super::rotation::{IDENTITY, tests::turn};
+    use super::super::rotation::tests::turn;
     use super::*;
+    use crate::geometry::linear::IDENTITY;
 
     const STIFF: Stiffness = Stiffness {
         stiffness: 1.0,
@@ -268,7 +268,7 @@ mod tests {
         {
             // Where all ties are at rest and all pulls followed nothing is left to gain; gradients
             // stop at 1e-5 of forces of about 100.
-            assert!(mesh::length(mesh::difference(goal(place), *moved)) < 1e-3);
+            assert!(length(difference(goal(place), *moved)) < 1e-3);
             for (found, wanted) in found.as_flattened().iter().zip(rotation.as_flattened()) {
                 assert!((found - wanted).abs() < 1e-3);
             }

@@ -3,7 +3,7 @@
 use burn::tensor::Tensor;
 use isomorph_model::{Geometry, ModelBackend};
 
-use super::frames::FramesError;
+use super::error::FramesError;
 use super::trained::{Surface, Trained, some_of};
 use crate::tensors::{host, rows};
 

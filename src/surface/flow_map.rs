@@ -9,7 +9,7 @@
 use isomorph_model::{Carried, ModelBackend};
 
 use super::chunks::in_chunks;
-use super::extract::Grid;
+use crate::cubes::Grid;
 use crate::tensors::{host, rows};
 
 /// The longest side of a cell of the first lattice tried, in normalised units.

@@ -6,12 +6,12 @@ use burn::tensor::{Tensor, backend::Backend};
 use isomorph_model::operators::length;
 use isomorph_model::{Carried, Geometry, ModelBackend, Motion};
 
-use super::SurfaceMesh;
 use super::chunks::in_chunks;
-use super::extract::{Extraction, Grid, extract};
+use super::error::{FramesError, no_motion};
 use super::flow_map::{FlowMap, first_stride};
-use super::frames::{FramesError, no_motion};
-use crate::shape::{Bounds, Normalisation};
+use crate::cubes::{Extraction, Grid, extract};
+use crate::geometry::{Bounds, Mesh};
+use crate::shape::Normalisation;
 use crate::tensors::{host, rows};
 
 /// The most vertices at which an interpolated flow is compared with the flow itself.
@@ -38,14 +38,14 @@ pub enum Surface<B: Backend> {
     /// The zero set of a field.
     Field(Box<dyn Geometry<B>>),
     /// A mesh at time 0, normalised, that the motion carries: of methods that have no field.
-    Template(SurfaceMesh),
+    Template(Mesh<f32>),
 }
 
 /// A surface found at a time.
 #[derive(Clone, Debug)]
 pub struct Found {
     /// In normalised coordinates.
-    pub mesh: SurfaceMesh,
+    pub mesh: Mesh<f32>,
     /// Its connected pieces.
     pub components: usize,
     /// Pieces that were too small to be kept.
@@ -134,9 +134,9 @@ impl<B: ModelBackend> Trained<B> {
 
     /// Unit normals of a surface, and the mean of `||grad f| - 1|` over its vertices where it is the zero
     /// set of a field `f`.
-    pub(super) fn normals(&self, mesh: &SurfaceMesh, time: f64) -> (Vec<[f32; 3]>, Option<f64>) {
+    pub(super) fn normals(&self, mesh: &Mesh<f32>, time: f64) -> (Vec<[f32; 3]>, Option<f64>) {
         let Some(gradients) = self.gradients(&mesh.vertices, time) else {
-            return (mesh.area_weighted_normals(), None);
+            return (mesh.vertex_normals(), None);
         };
         let mut normals = Vec::with_capacity(gradients.len());
         let mut off = 0.0;

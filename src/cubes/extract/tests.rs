@@ -6,6 +6,7 @@ use std::convert::Infallible;
 use proptest::prelude::*;
 
 use super::*;
+use crate::cubes::GridError;
 
 type Point = [f32; 3];
 type Shape = fn(Point) -> f32;
@@ -73,7 +74,7 @@ fn extracted(field: impl Fn(Point) -> f32, side: f32, resolution: usize) -> Extr
 }
 
 /// Closed, oriented, and one ring of triangles round every vertex.
-fn assert_closed_manifold(mesh: &SurfaceMesh) {
+fn assert_closed_manifold(mesh: &Mesh<f32>) {
     assert!(mesh.is_closed());
     let mut rings: Vec<HashMap<u32, u32>> = vec![HashMap::new(); mesh.vertices.len()];
     for &[a, b, c] in &mesh.triangles {

@@ -3,17 +3,18 @@
 use std::f64::consts::PI;
 
 use super::*;
-use crate::evaluate::Mesh;
 use crate::evaluate::sampled::{Use, generator};
-use crate::evaluate::testing::{cuboid, moved, sphere, square};
+use crate::evaluate::testing::{sphere, square};
+use crate::geometry::Mesh;
+use crate::geometry::testing::cuboid;
 
 const SAMPLES: usize = 10_000;
 
-fn sampled(mesh: &Mesh, purpose: Use) -> SampledSurface {
+fn sampled(mesh: &Mesh<f64>, purpose: Use) -> SampledSurface {
     SampledSurface::new(mesh, SAMPLES, generator(5, 0, purpose)).expect("area")
 }
 
-fn compared(surface: &Mesh, truth: &Mesh) -> Metrics {
+fn compared(surface: &Mesh<f64>, truth: &Mesh<f64>) -> Metrics {
     compare(
         &sampled(surface, Use::Compared),
         &sampled(truth, Use::Truth),
@@ -25,7 +26,7 @@ fn compared(surface: &Mesh, truth: &Mesh) -> Metrics {
 fn concentric_spheres_are_as_far_apart_as_their_radii() {
     let inner = sphere(5);
     let (gap, growth) = (0.1, 1.1);
-    let outer = moved(&inner, |vertex| vertex.map(|x| growth * x));
+    let outer = inner.moved(|vertex| vertex.map(|x| growth * x));
     let metrics = compared(&outer, &inner);
     // The nearest sample is beside the nearest point by s with E[s^2] = 1 / (pi rho): 4e-4 on the
     // unit sphere at 10,000, so a distance grows by s^2 / (2 gap) = 2e-3. The facets sag by 6e-4 of
@@ -106,7 +107,7 @@ fn hausdorff_is_that_of_the_worse_direction_and_chamfer_the_mean_of_both() {
 fn normals_of_a_tilted_plane_agree_by_the_cosine_of_the_tilt_whichever_way_they_point() {
     for tilt in [0.0_f64, 0.4, 1.2, PI - 0.4] {
         let (sin, cos) = tilt.sin_cos();
-        let tilted = moved(&square(0.0), |[x, y, _]| [cos * x, y, sin * x]);
+        let tilted = square(0.0).moved(|[x, y, _]| [cos * x, y, sin * x]);
         let metrics = compared(&tilted, &square(0.0));
         // Normals are float32.
         assert!(
@@ -119,12 +120,12 @@ fn normals_of_a_tilted_plane_agree_by_the_cosine_of_the_tilt_whichever_way_they_
 #[test]
 fn a_scaled_box_has_the_cube_of_the_volume_and_the_square_of_the_area() {
     let small = cuboid([1.0, 2.0, 3.0]);
-    let large = moved(&small, |vertex| vertex.map(|x| 1.5 * x));
+    let large = small.moved(|vertex| vertex.map(|x| 1.5 * x));
     let metrics = compared(&large, &small);
     // Few terms: rounding only.
     assert!((metrics.volume_ratio - 3.375).abs() < 1e-13);
     assert!((metrics.area_ratio - 2.25).abs() < 1e-13);
-    let inside_out = moved(&small, |[x, y, z]| [-x, y, z]);
+    let inside_out = small.moved(|[x, y, z]| [-x, y, z]);
     assert!((compared(&inside_out, &small).volume_ratio + 1.0).abs() < 1e-13);
 }
 

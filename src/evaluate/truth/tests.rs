@@ -1,7 +1,7 @@
 //! Ground truths as they are read, and as they are refused.
 
 use super::*;
-use crate::evaluate::testing::{moved, sphere};
+use crate::evaluate::testing::sphere;
 
 /// A tetrahedron whose last vertex is at this height, as an ASCII PLY file.
 fn write_ply(path: &Path, height: f64, faces: &str) {
@@ -24,7 +24,7 @@ fn refused(path: &Path) -> String {
 fn moving_sphere() -> (GroundTruth, Normalisation) {
     let ball = sphere(3);
     let frame = |k: usize| {
-        let mesh = moved(&ball, |[x, y, z]| [x + 1e5 + 0.1 * k as f64, y, z]);
+        let mesh = ball.moved(|[x, y, z]| [x + 1e5 + 0.1 * k as f64, y, z]);
         mesh.vertices
     };
     let frames = (0..6).map(frame).collect();

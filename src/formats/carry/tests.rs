@@ -151,5 +151,8 @@ fn a_file_can_be_carried_onto_itself() {
     let path = folder.path().join("quad.ply");
     std::fs::write(&path, QUAD_PLY).expect("written");
     rewrite_vertices(&path, &STANDING, &path).expect("carried");
-    assert_eq!(shape::read(&path).expect("read").vertices, STANDING);
+    assert_eq!(
+        crate::formats::read(&path).expect("read").mesh.vertices,
+        STANDING
+    );
 }

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::*;
-use crate::shape;
+use crate::formats;
 
 /// What a writer may choose.
 #[derive(Debug, Clone, Copy)]
@@ -80,7 +80,7 @@ pub fn read_bytes(bytes: &[u8]) -> Result<Shape, ShapeError> {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("shape.ply");
     std::fs::write(&path, bytes).expect("written");
-    shape::read(&path)
+    formats::read(&path)
 }
 
 fn message(bytes: &[u8]) -> String {
@@ -100,8 +100,8 @@ fn changed(from: &str, to: &str) -> Vec<u8> {
 fn every_encoding_gives_the_same_shape_and_polygons_become_fans() {
     for kind in [Kind::Ascii, Kind::Little, Kind::Big] {
         let shape = read_bytes(&pyramid(kind)).expect("read");
-        assert_eq!(shape.vertices[2], [2.0, 2.0, 0.0]);
-        assert_eq!(shape.vertices[4], [1.0; 3]);
+        assert_eq!(shape.mesh.vertices[2], [2.0, 2.0, 0.0]);
+        assert_eq!(shape.mesh.vertices[4], [1.0; 3]);
         let fans = [
             [0, 3, 2],
             [0, 2, 1],
@@ -110,9 +110,9 @@ fn every_encoding_gives_the_same_shape_and_polygons_become_fans() {
             [2, 3, 4],
             [3, 0, 4],
         ];
-        assert_eq!(shape.triangles, fans, "{kind:?}");
+        assert_eq!(shape.mesh.triangles, fans, "{kind:?}");
         assert_eq!(
-            shape.normals,
+            shape.mesh.normals,
             Some(vec![[0.0, 0.0, -1.0]; 5]),
             "made unit length"
         );
@@ -128,10 +128,17 @@ fn a_cloud_has_no_triangles_and_normals_only_if_the_file_has() {
     (0..64).for_each(|i| writeln!(text, "500000.123456789 {i} -1.5e-3\r").expect("grows"));
     let cloud = read_bytes(text.as_bytes()).expect("read");
     assert_eq!(
-        (cloud.vertices.len(), cloud.is_mesh(), cloud.normals),
+        (
+            cloud.mesh.vertices.len(),
+            cloud.is_mesh(),
+            cloud.mesh.normals
+        ),
         (64, false, None)
     );
-    assert_eq!(cloud.vertices[63], [500_000.123_456_789, 63.0, -0.0015]);
+    assert_eq!(
+        cloud.mesh.vertices[63],
+        [500_000.123_456_789, 63.0, -0.0015]
+    );
 }
 
 #[test]
@@ -231,5 +238,5 @@ fn a_negative_list_length_is_refused() {
 #[test]
 fn a_normal_without_direction_is_read_as_zero() {
     let shape = read_bytes(&changed("255 0 0 -2E0", "255 0 0 0")).expect("read");
-    assert_eq!(shape.normals.expect("normals")[0], [0.0; 3]);
+    assert_eq!(shape.mesh.normals.expect("normals")[0], [0.0; 3]);
 }

@@ -2,14 +2,23 @@
 
 use super::*;
 
-const TRIANGLES: [[u32; 3]; 2] = [[0, 1, 2], [2, 1, 3]];
-const NORMALS: [[f32; 3]; 4] = [[0.0, 0.0, 1.0]; 4];
-
-fn square(shift: f64) -> [[f64; 3]; 4] {
-    [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]].map(|[x, y]| [x + shift, y, 0.25])
+/// A unit square of two triangles, `shift` along x from the origin.
+fn square(shift: f64) -> Mesh<f64> {
+    let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]];
+    Mesh::new(
+        corners.map(|[x, y]| [x + shift, y, 0.25]).to_vec(),
+        vec![[0, 1, 2], [2, 1, 3]],
+    )
 }
 
-fn written(surface: SurfaceView<'_>, format: SurfaceFormat) -> Vec<u8> {
+fn with_normals() -> Mesh<f64> {
+    Mesh {
+        normals: Some(vec![[0.0, 0.0, 1.0]; 4]),
+        ..square(0.0)
+    }
+}
+
+fn written(surface: &Mesh<f64>, format: SurfaceFormat) -> Vec<u8> {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("out").with_extension(format.extension());
     write_surface(surface, &path, format).expect("a good surface");
@@ -18,13 +27,8 @@ fn written(surface: SurfaceView<'_>, format: SurfaceFormat) -> Vec<u8> {
 
 #[test]
 fn a_binary_ply_holds_the_bytes_that_its_header_promises() {
-    let vertices = square(0.0);
-    let surface = SurfaceView {
-        vertices: &vertices,
-        triangles: &TRIANGLES,
-        normals: Some(&NORMALS),
-    };
-    let bytes = written(surface, SurfaceFormat::Ply);
+    let surface = with_normals();
+    let bytes = written(&surface, SurfaceFormat::Ply);
     let end = bytes
         .windows(11)
         .position(|window| window == b"end_header\n")
@@ -51,13 +55,8 @@ fn f32_of(bytes: &[u8]) -> f32 {
 
 #[test]
 fn ply_rs_reads_what_was_written() {
-    let vertices = square(0.0);
-    let surface = SurfaceView {
-        vertices: &vertices,
-        triangles: &TRIANGLES,
-        normals: None,
-    };
-    let bytes = written(surface, SurfaceFormat::Ply);
+    let surface = square(0.0);
+    let bytes = written(&surface, SurfaceFormat::Ply);
     let parser = ply_rs::parser::Parser::<ply_rs::ply::DefaultElement>::new();
     let ply = parser.read_ply(&mut &bytes[..]).expect("a PLY file");
     assert_eq!(ply.payload["vertex"].len(), 4);
@@ -67,77 +66,53 @@ fn ply_rs_reads_what_was_written() {
 
 #[test]
 fn an_obj_counts_from_one_and_names_its_normals() {
-    let vertices = square(0.0);
-    let surface = SurfaceView {
-        vertices: &vertices,
-        triangles: &TRIANGLES,
-        normals: Some(&NORMALS),
-    };
-    let text = String::from_utf8(written(surface, SurfaceFormat::Obj)).expect("UTF-8");
+    let surface = with_normals();
+    let text = String::from_utf8(written(&surface, SurfaceFormat::Obj)).expect("UTF-8");
     let lines: Vec<&str> = text.lines().skip(1).collect();
     assert_eq!(lines.len(), 4 + 4 + 2);
     assert_eq!(
         (lines[1], lines[4], lines[9]),
         ("v 1 0 0.25", "vn 0 0 1", "f 3//3 2//2 4//4")
     );
-    let bare = SurfaceView {
-        normals: None,
-        ..surface
-    };
-    let text = String::from_utf8(written(bare, SurfaceFormat::Obj)).expect("UTF-8");
+    let bare = square(0.0);
+    let text = String::from_utf8(written(&bare, SurfaceFormat::Obj)).expect("UTF-8");
     assert!(text.ends_with("f 3 2 4\n"), "{text}");
 }
 
 #[test]
 fn coordinates_far_from_the_origin_keep_their_detail() {
-    let vertices = square(4_500_000.125);
-    let surface = SurfaceView {
-        vertices: &vertices,
-        triangles: &TRIANGLES,
-        normals: None,
-    };
-    let bytes = written(surface, SurfaceFormat::Ply);
+    let surface = square(4_500_000.125);
+    let bytes = written(&surface, SurfaceFormat::Ply);
     let header = String::from_utf8_lossy(&bytes[..200]).into_owned();
     assert!(header.contains("property double x"), "{header}");
-    let text = String::from_utf8(written(surface, SurfaceFormat::Obj)).expect("UTF-8");
+    let text = String::from_utf8(written(&surface, SurfaceFormat::Obj)).expect("UTF-8");
     assert!(text.contains("v 4500001.125 0 0.25\n"), "{text}");
-    assert!(!needs_f64(&square(99.0)) && needs_f64(&square(101.0)));
+    assert!(!needs_f64(&square(99.0).vertices) && needs_f64(&square(101.0).vertices));
 }
 
 #[test]
 fn bad_surfaces_are_refused_and_leave_no_file() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("bad.ply");
-    let mut vertices = square(0.0);
-    let good = SurfaceView {
-        vertices: &vertices,
-        triangles: &TRIANGLES,
-        normals: None,
-    };
-    let refused = |surface: SurfaceView<'_>| {
+    let refused = |surface: &Mesh<f64>| {
         let refused = write_surface(surface, &path, SurfaceFormat::Ply).expect_err("a bad surface");
         assert!(!path.exists());
         refused.to_string()
     };
-    let message = refused(SurfaceView {
-        triangles: &[[0, 1, 2], [0, 1, 4]],
-        ..good
-    });
+    let mut bad = square(0.0);
+    bad.triangles = vec![[0, 1, 2], [0, 1, 4]];
+    let message = refused(&bad);
     assert!(
         message.contains("bad.ply: triangle 1 uses vertex 4: must be 0 to 3"),
         "{message}"
     );
-    let message = refused(SurfaceView {
-        normals: Some(&NORMALS[1..]),
-        ..good
-    });
+    let mut bad = with_normals();
+    bad.normals.as_mut().expect("normals").pop();
+    let message = refused(&bad);
     assert!(message.contains("3 normals for 4 vertices"), "{message}");
-    vertices[2][1] = f64::NAN;
-    let message = refused(SurfaceView {
-        vertices: &vertices,
-        triangles: &TRIANGLES,
-        normals: None,
-    });
+    let mut bad = square(0.0);
+    bad.vertices[2][1] = f64::NAN;
+    let message = refused(&bad);
     assert!(
         message.contains("vertex 2 lies at [0.0, NaN, 0.25]"),
         "{message}"

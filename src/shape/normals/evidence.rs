@@ -14,8 +14,8 @@
 
 use rayon::prelude::*;
 
-use super::super::mesh;
-use super::super::winding::{Charges, SummationTree};
+use crate::geometry::linear::dot;
+use crate::geometry::winding::{Charges, SummationTree};
 
 /// Steps of conjugate gradients. Fewer leave thin parts in doubt, many more fit the spacing of the
 /// points.
@@ -41,7 +41,7 @@ pub fn outward(
     let dipoles = problem.solve();
     let clear = |((dipole, normal), &area): ((&[f64; 3], &[f64; 3]), &f64)| {
         if area > 0.0 {
-            (mesh::dot(*dipole, *normal) / area).clamp(-1.0, 1.0)
+            (dot(*dipole, *normal) / area).clamp(-1.0, 1.0)
         } else {
             0.0
         }
@@ -103,7 +103,7 @@ impl Problem<'_> {
         let scaled = pulls.iter().zip(self.areas);
         let scaled: Vec<[f64; 3]> = scaled.map(|(pull, area)| pull.map(|x| x * area)).collect();
         // Summed in order: the same on any number of cores.
-        let slope = pulls.iter().zip(&scaled).map(|(a, b)| mesh::dot(*a, *b));
+        let slope = pulls.iter().zip(&scaled).map(|(a, b)| dot(*a, *b));
         let slope = slope.sum();
         (scaled, slope)
     }
@@ -124,7 +124,7 @@ impl Problem<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shape::testing::sphere_cloud;
+    use crate::geometry::testing::sphere_cloud;
 
     #[test]
     fn each_point_of_a_sphere_knows_which_way_is_out() {

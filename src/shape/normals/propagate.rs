@@ -2,7 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::super::{Neighbour, mesh};
+use crate::geometry::Neighbour;
+use crate::geometry::linear::{difference, dot};
 
 /// How much two parts must lose by a link that makes them contradict each other, in points that
 /// surely know which way is out, for the link to be refused.
@@ -48,7 +49,7 @@ fn links(points: &[[f64; 3]], normals: &[[f64; 3]], neighbours: &[Vec<Neighbour>
                     from: from as u32,
                     to: to as u32,
                     agreement: agreement(
-                        mesh::difference(points[to], points[from]),
+                        difference(points[to], points[from]),
                         normals[from],
                         normals[to],
                     ) as f32,
@@ -72,15 +73,12 @@ fn links(points: &[[f64; 3]], normals: &[[f64; 3]], neighbours: &[Vec<Neighbour>
 /// is the less sure the more squarely one looks at the other: then they lie on two sheets, or
 /// noise has moved them apart.
 fn agreement(apart: [f64; 3], a: [f64; 3], b: [f64; 3]) -> f64 {
-    let distance = mesh::dot(apart, apart).sqrt();
+    let distance = dot(apart, apart).sqrt();
     if distance == 0.0 {
-        return mesh::dot(a, b);
+        return dot(a, b);
     }
-    let (x, y) = (
-        mesh::dot(apart, a) / distance,
-        mesh::dot(apart, b) / distance,
-    );
-    (mesh::dot(a, b) - 2.0 * x * y) * (1.0 - x.abs().max(y.abs()))
+    let (x, y) = (dot(apart, a) / distance, dot(apart, b) / distance);
+    (dot(a, b) - 2.0 * x * y) * (1.0 - x.abs().max(y.abs()))
 }
 
 /// Sets of points whose signs are tied to each other (union-find with parity), with what is known
