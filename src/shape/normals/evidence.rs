@@ -59,12 +59,19 @@ struct Problem<'a> {
 }
 
 impl Problem<'_> {
-    /// Conjugate gradients on the normal equations (CGLS), from zero.
+    /// Conjugate gradients for least squares (CGLS; Björck, "Numerical Methods for Least Squares Problems",
+    /// 1996), from zero.
+    ///
+    /// Not `isomorph_model::linear::conjugate_gradient` on the normal equations: that takes the
+    /// curvature from the product of the direction with `W^T W` of it, and `W^T` is only close to the
+    /// adjoint of `W` here ([`SummationTree::pull`]). Here the curvature is a sum of squares, which
+    /// cannot be negative, and the residual is that of the equations themselves.
     fn solve(&self) -> Vec<[f64; 3]> {
         let mut dipoles = vec![[0.0; 3]; self.points.len()];
         let mut residual = vec![0.5; self.points.len()];
         let (mut gradient, mut slope) = self.gradient(&residual);
         let mut direction = gradient;
+        // A fixed number of steps and no tolerance: stopping early is the regularisation.
         for _ in 0..STEPS {
             let change = self.winding(&direction);
             let squares = change.iter().zip(self.areas).map(|(c, a)| c * c * a);
