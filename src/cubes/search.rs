@@ -56,6 +56,8 @@ where
 
     /// Evaluates the field wherever the surface is; afterwards every cell that it crosses is known.
     pub(super) fn find_surface(&mut self) -> Result<(), ExtractError<E>> {
+        // Each round assumes the steepest slope that was measured. Values found before are kept, so that
+        // only the cells dropped in error cost anything.
         let mut assumed = 0.0;
         while let Some(steeper) = self.descend(assumed)? {
             assumed = steeper;
@@ -74,7 +76,9 @@ where
         let mut least_allowed = f32::INFINITY;
         while stride > 1 {
             steepest = self.steepest(&cells, stride).max(steepest);
+            // The limit under which any cell was dropped: the slope found in the end is held against it.
             least_allowed = least_allowed.min(caution * steepest);
+            // Slopes are per fine cell, so the side of a cell here is `stride`.
             let reach = caution * steepest * MEAN_DISTANCE * stride as f32;
             cells.retain(|&cell| self.may_hold_surface(cell, stride, reach));
             caution = CAUTION;
@@ -88,6 +92,7 @@ where
 
     /// Step 3.
     fn follow(&mut self) -> Result<(), ExtractError<E>> {
+        // All known nodes, not only those of the last descent: the surface may pass by an older one.
         let mut fresh: Vec<(Node, f32)> = self.lattice.known().collect();
         // At first every edge is met at its lower end; later ones may lead back to older nodes.
         let mut directions: &[bool] = &[true];
@@ -99,6 +104,7 @@ where
                     }
                 }
             }
+            // Only new nodes can make new changes of sign.
             let asked = self.awaited.clone();
             self.evaluate_awaited()?;
             directions = &[false, true];
@@ -117,6 +123,7 @@ where
         if !self.lattice.get(other).is_some_and(changes) {
             return;
         }
+        // Both ends with their neighbours across the edge: the corners of the four cells round it.
         let (second, third) = ((axis + 1) % 3, (axis + 2) % 3);
         for end in [node, other] {
             for along_second in self.neighbourhood(end, second) {
@@ -199,6 +206,7 @@ where
         let mut steepest = 0.0_f32;
         for &cell in cells {
             let values = self.known_corners(cell, stride);
+            // At the box a cell may be cut short, so its sides need not be equal.
             let far = self.corner_in_box(cell, 7, stride);
             let square: [u32; 3] = std::array::from_fn(|axis| (far[axis] - cell[axis]).pow(2));
             for (i, j) in (0..8_usize).flat_map(|j| (0..j).map(move |i| (i, j))) {
@@ -212,6 +220,7 @@ where
 
     fn may_hold_surface(&self, cell: Node, stride: u32, reach: f32) -> bool {
         let values = self.known_corners(cell, stride);
+        // A change of sign is proof; without one the mean of the distances decides.
         let inside = values.iter().filter(|&&value| value < 0.0).count();
         let mean = values.iter().map(|value| value.abs()).sum::<f32>() / 8.0;
         (1..8).contains(&inside) || mean < reach
@@ -255,6 +264,7 @@ where
                 });
             }
             for (&point, &value) in batch.iter().zip(&values) {
+                // The lattice marks unknown nodes by such values, and no slope could be had from them.
                 if !value.is_finite() {
                     return Err(ExtractError::NotFinite { point, value });
                 }
