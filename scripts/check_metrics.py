@@ -34,7 +34,7 @@ SAMPLES = 100_000
 
 
 def read_sequence(path):
-    """(frames, vertices, 3) positions, (triangles, 3) indices; layout: src/shape/anime.rs."""
+    """(frames, vertices, 3) positions, (triangles, 3) indices; layout: src/formats/anime.rs."""
     data = Path(path).read_bytes()
     frames, vertices, triangles = np.frombuffer(data, "<i4", 3)
     first = np.frombuffer(data, "<f4", 3 * vertices, 12).reshape(-1, 3)

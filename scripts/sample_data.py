@@ -5,7 +5,7 @@
 
 SEQUENCES is the folder that holds fox_survey.anime and human_raise_arms.anime (their provenance:
 data/README.md); DATA is where the pairs go (default: data/ beside scripts/). Standard library only.
-The same sequences give the same bytes. Layout of .anime: src/shape/anime.rs.
+The same sequences give the same bytes. Layout of .anime: src/formats/anime.rs.
 
 Per pair: source.ply and target.ply (binary, with faces, without normals) and pairs.csv. The
 sequences are vertex-consistent, which no scan is; so that the files give away no more than

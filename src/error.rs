@@ -9,16 +9,15 @@ use isomorph_training::engine::NotHere;
 
 use crate::backend::BackendError;
 use crate::compare::{ChartError, DigestError, PlanError, ReportError, StoreError};
+use crate::cubes::GridError;
 use crate::evaluate::TruthError;
+use crate::formats::{ShapeError, WriteError};
 use crate::matching::MatchError;
 use crate::recipe::RecipeError;
 use crate::session::checkpoint::CheckpointError;
 use crate::session::folder::FolderError;
 use crate::session::learner::LearnerError;
-use crate::shape::ShapeError;
-use crate::surface::extract::GridError;
-use crate::surface::frames::FramesError;
-use crate::surface::write::WriteError;
+use crate::surface::FramesError;
 
 /// What kind of thing went wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -9,7 +9,7 @@
 //! let mut session = Session::prepare(recipe, "runs/pair", Backend::Flex)?;
 //! let trained = session.train(|event| println!("{event}"))?;
 //! let half_way = trained.surface(0.5, 192)?;
-//! println!("{} triangles", half_way.triangles.len());
+//! println!("{} triangles", half_way.mesh.triangles.len());
 //! # Ok(())
 //! # }
 //! ```
@@ -33,8 +33,11 @@ pub mod event;
 mod atomic;
 mod backend;
 mod compare;
+mod cubes;
 mod error;
 mod evaluate;
+mod formats;
+mod geometry;
 mod matching;
 mod memory;
 mod report;
@@ -45,6 +48,8 @@ mod surface;
 pub use backend::Backend;
 pub use error::{Error, ErrorKind, Result};
 pub use event::Event;
+pub use formats::{Shape, SurfaceFormat};
+pub use geometry::{Mesh, Scalar};
 pub use isomorph_training::recipe;
 pub use recipe::Recipe;
 pub use session::describe::describe;
@@ -53,8 +58,7 @@ pub use session::folder::is_run;
 pub use session::stop::StopFlag;
 pub use session::trained::{Distances, Surface};
 pub use session::{Session, Trained};
-pub use shape::{Keyframes, Shape};
-pub use surface::write::SurfaceFormat;
+pub use shape::Keyframes;
 
 /// Corresponding vertices of two shapes, found from the shapes alone.
 pub mod correspondence {

@@ -41,6 +41,7 @@
 pub mod autodiff;
 pub mod baseline;
 pub mod flow;
+pub mod linear;
 pub mod loss;
 pub mod nets;
 mod objective;

@@ -13,9 +13,8 @@
 
 use rayon::prelude::*;
 
-use super::Mesh;
 use super::sampled::{NoArea, sample};
-use crate::shape::{Neighbour, NeighbourSearch};
+use crate::geometry::{Mesh, Neighbour, NeighbourSearch};
 
 /// Farther than this from a frame's own time a surface is not tried.
 pub(super) const WINDOW: f64 = 0.25;
@@ -80,7 +79,7 @@ pub(super) struct CoarseSurface {
 
 impl CoarseSurface {
     /// Samples a mesh.
-    pub(super) fn new(mesh: &Mesh, mut rng: rand_chacha::ChaCha8Rng) -> Result<Self, NoArea> {
+    pub(super) fn new(mesh: &Mesh<f64>, mut rng: rand_chacha::ChaCha8Rng) -> Result<Self, NoArea> {
         let mut points = sample(mesh, COARSE_SAMPLES, &mut rng)?.points;
         let search = NeighbourSearch::new(&points);
         // Samples are independent, so the first ones cover the surface as well as any.

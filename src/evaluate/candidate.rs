@@ -2,24 +2,7 @@
 
 use std::fmt::{Debug, Display};
 
-/// Triangles over shared vertices, in normalised coordinates.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Mesh {
-    /// Vertex positions.
-    pub vertices: Vec<[f64; 3]>,
-    /// Vertex indices, counter-clockwise seen from outside.
-    pub triangles: Vec<[u32; 3]>,
-}
-
-impl Mesh {
-    /// Vertices that the networks know in float32, with triangles between them.
-    pub fn of_points(points: &[[f32; 3]], triangles: &[[u32; 3]]) -> Self {
-        Self {
-            vertices: points.iter().map(|point| point.map(f64::from)).collect(),
-            triangles: triangles.to_vec(),
-        }
-    }
-}
+use crate::geometry::Mesh;
 
 /// Positions of the same vertices at several times: one list per time, all of the same length.
 pub type Carried = Vec<Vec<[f32; 3]>>;
@@ -42,7 +25,7 @@ pub trait Candidate {
     ///
     /// # Errors
     /// Whatever keeps the method from giving one.
-    fn surface(&mut self, time: f64, purpose: Purpose) -> Result<Option<Mesh>, Self::Error>;
+    fn surface(&mut self, time: f64, purpose: Purpose) -> Result<Option<Mesh<f64>>, Self::Error>;
 
     /// The vertices `start`, given where they are at time 0, at each of `times`; none if the method
     /// carries no points.

@@ -11,7 +11,8 @@ use super::metrics::compare;
 use super::reference::{Reference, TrueFrame};
 use super::sampled::{NoArea, SampledSurface, Use, generator};
 use super::vertex_path::VertexPath;
-use super::{Candidate, Compared, EvaluateError, Evaluation, FrameResult, Mesh, Metrics, Purpose};
+use super::{Candidate, Compared, EvaluateError, Evaluation, FrameResult, Metrics, Purpose};
+use crate::geometry::Mesh;
 
 /// Points near the true surface at which `|grad f|` is looked at.
 const SLOPE_POINTS: usize = 2000;
@@ -177,7 +178,7 @@ impl Reference {
         frame: &TrueFrame,
         time: f64,
         purpose: Purpose,
-    ) -> Measured<C, Option<Mesh>> {
+    ) -> Measured<C, Option<Mesh<f64>>> {
         let failed = |reason| candidate_error(frame, time, reason);
         candidate.surface(time, purpose).map_err(failed)
     }
@@ -260,7 +261,7 @@ fn no_area<E: std::fmt::Debug + std::fmt::Display>(
     frame: &TrueFrame,
     time: f64,
     kind: &'static str,
-    mesh: &Mesh,
+    mesh: &Mesh<f64>,
     NoArea { area }: NoArea,
 ) -> EvaluateError<E> {
     EvaluateError::Area {

@@ -96,5 +96,4 @@ pub(super) fn mean_squared_error(found: &[[f32; 3]], truth: &[[f32; 3]]) -> f64 
 }
 
 #[cfg(test)]
-#[path = "metrics_tests.rs"]
 mod tests;

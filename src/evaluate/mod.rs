@@ -38,7 +38,7 @@ mod tests;
 mod truth;
 mod vertex_path;
 
-pub use candidate::{Candidate, Carried, Mesh, Purpose};
+pub use candidate::{Candidate, Carried, Purpose};
 pub use error::{EvaluateError, TruthError};
 pub use evaluation::{Compared, Evaluation, FrameResult, Metrics};
 pub use reference::{Options, Reference};

@@ -5,7 +5,8 @@ use super::align::evenly_spaced;
 use super::metrics::{compare, mean_squared_error};
 use super::sampled::{NoArea, SampledSurface, Use, generator};
 use super::vertex_path::VertexPath;
-use super::{Compared, GroundTruth, Mesh, Metrics, Span, TruthError};
+use super::{Compared, GroundTruth, Metrics, Span, TruthError};
+use crate::geometry::Mesh;
 use crate::shape::Normalisation;
 
 /// The fewest times to align with: with fewer none would be within a quarter of a frame's own.
@@ -210,7 +211,7 @@ impl Reference {
     /// A surface, sampled for a frame.
     pub(super) fn sampled(
         &self,
-        mesh: &Mesh,
+        mesh: &Mesh<f64>,
         frame: &TrueFrame,
         purpose: Use,
     ) -> Result<SampledSurface, NoArea> {
@@ -219,7 +220,7 @@ impl Reference {
     }
 
     /// Vertices of the true mesh, wherever they are, as a mesh.
-    pub(super) fn mesh(&self, vertices: &[[f32; 3]]) -> Mesh {
+    pub(super) fn mesh(&self, vertices: &[[f32; 3]]) -> Mesh<f64> {
         Mesh::of_points(vertices, &self.triangles)
     }
 

@@ -3,9 +3,9 @@
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::Mesh;
 use super::pieces::Pieces;
-use crate::shape::{NeighbourSearch, SurfaceSamples, mesh, sample_surface};
+use crate::geometry::{Mesh, NeighbourSearch};
+use crate::shape::{SurfaceSamples, sample_surface};
 
 /// What a set of samples is for: samples for different uses are independent of each other.
 #[derive(Clone, Copy, Debug)]
@@ -40,14 +40,14 @@ pub(super) struct NoArea {
 
 /// Area-uniform points on a mesh, or why there are none.
 pub(super) fn sample(
-    mesh: &Mesh,
+    mesh: &Mesh<f64>,
     count: usize,
     rng: &mut ChaCha8Rng,
 ) -> Result<SurfaceSamples, NoArea> {
     // The sum of nothing is -0, which would look odd in a message.
-    let area = mesh::area(&mesh.vertices, &mesh.triangles) + 0.0;
+    let area = mesh.area() + 0.0;
     if area > 0.0 && area.is_finite() {
-        Ok(sample_surface(&mesh.vertices, &mesh.triangles, count, rng))
+        Ok(sample_surface(mesh, count, rng))
     } else {
         Err(NoArea { area })
     }
@@ -72,19 +72,15 @@ pub(super) struct SampledSurface {
 
 impl SampledSurface {
     /// Draws `count` samples and measures the mesh.
-    pub(super) fn new(mesh: &Mesh, count: usize, mut rng: ChaCha8Rng) -> Result<Self, NoArea> {
+    pub(super) fn new(mesh: &Mesh<f64>, count: usize, mut rng: ChaCha8Rng) -> Result<Self, NoArea> {
         let samples = sample(mesh, count, &mut rng)?;
-        let Mesh {
-            vertices,
-            triangles,
-        } = mesh;
         Ok(Self {
             search: NeighbourSearch::new(&samples.points),
             points: samples.points,
             normals: samples.normals,
-            area: mesh::area(vertices, triangles),
-            volume: mesh::signed_volume(vertices, triangles),
-            pieces: Pieces::of(vertices, triangles),
+            area: mesh.area(),
+            volume: mesh.volume(),
+            pieces: Pieces::of(mesh),
         })
     }
 }

@@ -2,49 +2,21 @@
 
 use std::collections::HashMap;
 
-use super::Mesh;
-use crate::shape::mesh::length;
+use crate::geometry::Mesh;
+use crate::geometry::linear::length;
 
 /// A unit square in the plane z = `height`.
-pub fn square(height: f64) -> Mesh {
+pub fn square(height: f64) -> Mesh<f64> {
     let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
-    Mesh {
-        vertices: corners.map(|[x, y]| [x, y, height]).to_vec(),
-        triangles: vec![[0, 1, 2], [0, 2, 3]],
-    }
-}
-
-/// The mesh with its vertices moved.
-pub fn moved(mesh: &Mesh, by: impl Fn([f64; 3]) -> [f64; 3]) -> Mesh {
-    Mesh {
-        vertices: mesh.vertices.iter().map(|&vertex| by(vertex)).collect(),
-        triangles: mesh.triangles.clone(),
-    }
-}
-
-/// A box with these edges and a corner at the origin, wound outwards.
-pub fn cuboid(edges: [f64; 3]) -> Mesh {
-    let corner = |i: usize| [0, 1, 2].map(|axis| edges[axis] * (i >> axis & 1) as f64);
-    let faces = [
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-    ];
-    Mesh {
-        vertices: (0..8).map(corner).collect(),
-        triangles: faces
-            .iter()
-            .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
-            .collect(),
-    }
+    Mesh::new(
+        corners.map(|[x, y]| [x, y, height]).to_vec(),
+        vec![[0, 1, 2], [0, 2, 3]],
+    )
 }
 
 /// The unit sphere about the origin: an octahedron whose triangles are split in four `splits`
 /// times.
-pub fn sphere(splits: usize) -> Mesh {
+pub fn sphere(splits: usize) -> Mesh<f64> {
     let mut vertices: Vec<[f64; 3]> = Vec::new();
     for axis in 0..3 {
         for sign in [1.0, -1.0] {
@@ -81,8 +53,5 @@ pub fn sphere(splits: usize) -> Mesh {
         };
         triangles = triangles.into_iter().flat_map(split).collect();
     }
-    Mesh {
-        vertices,
-        triangles,
-    }
+    Mesh::new(vertices, triangles)
 }

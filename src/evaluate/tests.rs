@@ -6,8 +6,9 @@ use std::sync::OnceLock;
 
 use serde_json::Value;
 
-use super::testing::{moved, sphere};
+use super::testing::sphere;
 use super::*;
+use crate::geometry::Mesh;
 use crate::shape::Normalisation;
 
 /// Frames of the moving sphere; the ends are the first and the last.
@@ -32,7 +33,7 @@ fn truth() -> GroundTruth {
     let ball = sphere(3);
     let frame = |k: usize| {
         let by = 3.0 * k as f64 / (FRAMES - 1) as f64;
-        moved(&ball, |[x, y, z]| [x + by, y, z]).vertices
+        ball.moved(|[x, y, z]| [x + by, y, z]).vertices
     };
     let frames = (0..FRAMES).map(frame).collect();
     GroundTruth::new("ball.anime".into(), frames, ball.triangles).expect("nine frames")
@@ -51,7 +52,7 @@ fn reference(options: Options) -> Result<Reference, TruthError> {
 
 /// The same sphere, at `t^2` of its way; what it may lack is switched off.
 struct Late {
-    ball: Mesh,
+    ball: Mesh<f64>,
     way: f64,
     radius: f64,
     surface: bool,
@@ -86,14 +87,14 @@ impl Late {
 impl Candidate for Late {
     type Error = String;
 
-    fn surface(&mut self, time: f64, _: Purpose) -> Result<Option<Mesh>, String> {
+    fn surface(&mut self, time: f64, _: Purpose) -> Result<Option<Mesh<f64>>, String> {
         if time > self.fails_after {
             return Err("the surface is empty".to_owned());
         }
         let by = self.by(time);
         Ok(self
             .surface
-            .then(|| moved(&self.ball, |[x, y, z]| [x + by, y, z])))
+            .then(|| self.ball.moved(|[x, y, z]| [x + by, y, z])))
     }
 
     fn carried(&mut self, start: &[[f32; 3]], times: &[f64]) -> Result<Option<Carried>, String> {
@@ -286,7 +287,7 @@ struct Forgetful;
 impl Candidate for Forgetful {
     type Error = String;
 
-    fn surface(&mut self, _: f64, _: Purpose) -> Result<Option<Mesh>, String> {
+    fn surface(&mut self, _: f64, _: Purpose) -> Result<Option<Mesh<f64>>, String> {
         Ok(None)
     }
 

@@ -8,7 +8,9 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::TruthError;
-use crate::shape::{self, NeighbourSearch, Normalisation, Sequence, Shape, ShapeError};
+use crate::formats::{self, Sequence, Shape, ShapeError};
+use crate::geometry::{Mesh, NeighbourSearch};
+use crate::shape::{Normalisation, sample_surface};
 
 /// The ends and one frame in between.
 pub(super) const FEWEST_FRAMES: usize = 3;
@@ -49,7 +51,7 @@ impl GroundTruth {
             });
         }
         let sequence = Sequence::read(path)?;
-        let vertices = |frame| Ok(sequence.shape(frame)?.vertices);
+        let vertices = |frame| Ok(sequence.shape(frame)?.mesh.vertices);
         let frames = (0..sequence.frames.len()).map(vertices);
         let frames = frames.collect::<Result<_, ShapeError>>()?;
         Self::new(path.to_owned(), frames, sequence.triangles)
@@ -58,7 +60,7 @@ impl GroundTruth {
     fn read_folder(folder: &Path) -> Result<Self, TruthError> {
         let mut shapes = Vec::new();
         for path in meshes_in(folder)? {
-            let shape = shape::read(&path)?;
+            let shape = formats::read(&path)?;
             if !shape.is_mesh() {
                 return Err(TruthError::Cloud { path });
             }
@@ -69,8 +71,11 @@ impl GroundTruth {
         }
         let triangles = shapes
             .first()
-            .map_or_else(Vec::new, |first| first.triangles.clone());
-        let frames = shapes.into_iter().map(|shape| shape.vertices).collect();
+            .map_or_else(Vec::new, |first| first.mesh.triangles.clone());
+        let frames = shapes
+            .into_iter()
+            .map(|shape| shape.mesh.vertices)
+            .collect();
         Self::new(folder.to_owned(), frames, triangles)
     }
 
@@ -121,9 +126,7 @@ impl GroundTruth {
     pub fn shape(&self, frame: usize) -> Shape {
         Shape {
             path: self.path.clone(),
-            vertices: self.frames[frame].clone(),
-            triangles: self.triangles.clone(),
-            normals: None,
+            mesh: Mesh::new(self.frames[frame].clone(), self.triangles.clone()),
         }
     }
 
@@ -189,13 +192,9 @@ impl GroundTruth {
         points: &[[f32; 3]],
     ) -> f64 {
         assert!(!points.is_empty(), "the distance of no points");
-        let vertices = self.normalised(frame, normalisation);
-        let vertices: Vec<_> = vertices
-            .iter()
-            .map(|vertex| vertex.map(f64::from))
-            .collect();
+        let mesh = Mesh::of_points(&self.normalised(frame, normalisation), &self.triangles);
         let mut rng = ChaCha8Rng::seed_from_u64(0);
-        let samples = shape::sample_surface(&vertices, &self.triangles, END_SAMPLES, &mut rng);
+        let samples = sample_surface(&mesh, END_SAMPLES, &mut rng);
         let points: Vec<_> = points.iter().map(|point| point.map(f64::from)).collect();
         let nearest = NeighbourSearch::new(&samples.points).nearest_one_of_each(&points);
         let distances = nearest.iter().map(|found| found.squared_distance.sqrt());
@@ -299,14 +298,14 @@ fn take_digits<'a>(text: &mut &'a str) -> &'a str {
 
 /// Whether a shape is the first one with its vertices moved.
 fn consistent(first: &Shape, shape: &Shape) -> Result<(), TruthError> {
-    let problem = if shape.vertices.len() != first.vertices.len() {
-        let (found, needed) = (shape.vertices.len(), first.vertices.len());
+    let problem = if shape.mesh.vertices.len() != first.mesh.vertices.len() {
+        let (found, needed) = (shape.mesh.vertices.len(), first.mesh.vertices.len());
         format!("{found} vertices instead of the {needed}")
-    } else if shape.triangles.len() != first.triangles.len() {
-        let (found, needed) = (shape.triangles.len(), first.triangles.len());
+    } else if shape.mesh.triangles.len() != first.mesh.triangles.len() {
+        let (found, needed) = (shape.mesh.triangles.len(), first.mesh.triangles.len());
         format!("{found} triangles instead of the {needed}")
     } else {
-        let pairs = shape.triangles.iter().zip(&first.triangles);
+        let pairs = shape.mesh.triangles.iter().zip(&first.mesh.triangles);
         let Some((triangle, (found, needed))) = pairs.enumerate().find(|(_, (a, b))| a != b) else {
             return Ok(());
         };
@@ -320,5 +319,4 @@ fn consistent(first: &Shape, shape: &Shape) -> Result<(), TruthError> {
 }
 
 #[cfg(test)]
-#[path = "truth_tests.rs"]
 mod tests;

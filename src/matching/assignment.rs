@@ -12,8 +12,7 @@
 use rayon::prelude::*;
 
 use super::elastic::Pull;
-use super::rotation::{Matrix, add, add_outer, scaled};
-use crate::shape::mesh;
+use crate::geometry::linear::{Matrix, add, add_outer, difference, dot, length, scaled};
 
 /// Rounds of scalings.
 const ROUNDS: usize = 10;
@@ -52,12 +51,12 @@ const MOST_REMOTENESS: f64 = 4.0;
 
 impl Likeness {
     fn affinity(&self, a: &Marks<'_>, i: usize, b: &Marks<'_>, j: usize) -> f32 {
-        let apart = mesh::difference(a.points[i], b.points[j]);
-        let mut exponent = mesh::dot(apart, apart) / (2.0 * self.sigma * self.sigma);
+        let apart = difference(a.points[i], b.points[j]);
+        let mut exponent = dot(apart, apart) / (2.0 * self.sigma * self.sigma);
         if exponent > FAINTEST {
             return 0.0;
         }
-        exponent += self.normals * (1.0 - mesh::dot(a.normals[i], b.normals[j]));
+        exponent += self.normals * (1.0 - dot(a.normals[i], b.normals[j]));
         if let Some(tolerance) = self.remoteness {
             let difference = (a.remoteness[i] - b.remoteness[j]) / tolerance;
             exponent += (0.5 * difference * difference).min(MOST_REMOTENESS);
@@ -110,7 +109,7 @@ pub(super) fn pulls(
 
 /// `strength` along the normal and `slide` times as much across it.
 pub(super) fn sliding(strength: f64, normal: [f64; 3], slide: f64) -> Matrix {
-    let length = mesh::length(normal);
+    let length = length(normal);
     let mut matrix = [[0.0; 3]; 3];
     let across = if length > 0.0 {
         slide * strength

@@ -16,9 +16,11 @@
 //! robust function `rho^2 s^2 / (rho^2 + s^2)` of Geman and McClure (1985), minimised by
 //! reweighting.
 
-use super::rotation::{Matrix, add, add_outer, nearest_rotation, scaled, times};
+use isomorph_model::linear::{Until, conjugate_gradient};
+
+use super::rotation::nearest_rotation;
 use super::surface::NodeMotion;
-use crate::shape::mesh;
+use crate::geometry::linear::{Matrix, add, add_outer, difference, dot, length, scaled, times};
 
 /// The least weight of a tie: even a joint holds together.
 const LEAST_WEIGHT: f64 = 1e-3;
@@ -27,10 +29,11 @@ const LEAST_WEIGHT: f64 = 1e-3;
 /// on a line keeps its turn about that line.
 const KEPT_TURN: f64 = 1e-3;
 
-/// Conjugate gradients end where the residual has fallen to this share of the right-hand side...
-const TOLERANCE: f64 = 1e-5;
-/// ... or after so many steps; the next round starts from where they ended.
-const GRADIENT_STEPS: usize = 60;
+/// Where conjugate gradients end; the next round starts from there.
+const UNTIL: Until = Until {
+    steps: 60,
+    tolerance: 1e-5,
+};
 
 /// What pulls a node.
 #[derive(Debug, Clone, Copy)]
@@ -77,17 +80,19 @@ impl ElasticNodes {
     pub(super) fn relax(&mut self, pulls: &[Pull], resistance: Stiffness, rounds: usize) {
         assert_eq!(pulls.len(), self.rest.len(), "one pull per node");
         for _ in 0..rounds {
+            // Each of the three lowers the same energy while the other two are held.
             self.renew_weights(resistance.give);
             self.renew_rotations();
             self.renew_places(pulls, resistance.stiffness);
         }
+        // Points between the nodes are carried by the rotations, which have to match the last places.
         self.renew_rotations();
     }
 
     /// `y_i - y_j` turned as the ends of the tie are.
     fn turned(&self, [i, j]: [u32; 2]) -> [f64; 3] {
         let (i, j) = (i as usize, j as usize);
-        let along = mesh::difference(self.rest[i], self.rest[j]);
+        let along = difference(self.rest[i], self.rest[j]);
         let turns = &self.motion.rotations;
         scaled(add(times(&turns[i], along), times(&turns[j], along)), 0.5)
     }
@@ -96,10 +101,11 @@ impl ElasticNodes {
         let weight = |&tie: &[u32; 2]| {
             let [i, j] = tie.map(|node| self.motion.places[node as usize]);
             let turned = self.turned(tie);
-            let stretch = mesh::difference(mesh::difference(i, j), turned);
+            let stretch = difference(difference(i, j), turned);
             let [from, to] = tie.map(|node| self.rest[node as usize]);
-            let length = mesh::difference(from, to);
-            let square = mesh::dot(stretch, stretch) / mesh::dot(length, length);
+            let length = difference(from, to);
+            // Relative to the tie's length: the same limit holds for short and long ties.
+            let square = dot(stretch, stretch) / dot(length, length);
             (1.0 + square / (give * give)).powi(-2).max(LEAST_WEIGHT)
         };
         self.weights = self.ties.iter().map(weight).collect();
@@ -110,16 +116,19 @@ impl ElasticNodes {
         let places = &self.motion.places;
         for (&[i, j], &weight) in self.ties.iter().zip(&self.weights) {
             let (i, j) = (i as usize, j as usize);
-            let now = mesh::difference(places[i], places[j]);
-            let then = mesh::difference(self.rest[i], self.rest[j]);
+            let now = difference(places[i], places[j]);
+            let then = difference(self.rest[i], self.rest[j]);
+            // Seen from the other end both vectors change sign, and their product does not.
             add_outer(&mut moments[i], weight, now, then);
             add_outer(&mut moments[j], weight, now, then);
         }
         for (turn, mut moment) in self.motion.rotations.iter_mut().zip(moments) {
-            let size = mesh::length(moment.map(mesh::length));
+            // The bias is relative to the moment's size, so that it acts alike at any scale.
+            let size = length(moment.map(length));
             for row in 0..3 {
                 moment[row] = add(moment[row], scaled(turn[row], KEPT_TURN * size));
             }
+            // A node without ties keeps its rotation.
             if size > 0.0 {
                 *turn = nearest_rotation(&moment);
             }
@@ -143,87 +152,49 @@ impl ElasticNodes {
             let turned = scaled(self.turned(tie), stiffness * weight);
             let [i, j] = tie.map(|node| node as usize);
             wanted[i] = add(wanted[i], turned);
-            wanted[j] = mesh::difference(wanted[j], turned);
+            wanted[j] = difference(wanted[j], turned);
             for node in [i, j] {
                 diagonal[node] = diagonal[node].map(|part| part + stiffness * weight);
             }
         }
+        // From where the nodes are: they move little from one round to the next, so the start is good.
         let mut places = std::mem::take(&mut self.motion.places);
-        let apply = |z: &[[f64; 3]]| self.forces(pulls, stiffness, z);
-        conjugate_gradients(apply, &wanted, &diagonal, &mut places);
+        let apply = |z: &[f64], forces: &mut [f64]| {
+            let (z, _) = z.as_chunks::<3>();
+            let (forces, _) = forces.as_chunks_mut::<3>();
+            self.forces(pulls, stiffness, z, forces);
+        };
+        // Divided by the diagonal: pulls differ by orders of magnitude between the nodes that have a
+        // counterpart and those that have none.
+        conjugate_gradient(
+            apply,
+            wanted.as_flattened(),
+            Some(diagonal.as_flattened()),
+            places.as_flattened_mut(),
+            UNTIL,
+        );
         self.motion.places = places;
     }
 
-    /// The matrix of the normal equations times `z`.
-    fn forces(&self, pulls: &[Pull], stiffness: f64, z: &[[f64; 3]]) -> Vec<[f64; 3]> {
-        let mut forces: Vec<[f64; 3]> = pulls
-            .iter()
-            .zip(z)
-            .map(|(pull, z)| times(&pull.strength, *z))
-            .collect();
+    /// The matrix of the normal equations times `z`, tie by tie: it is never stored.
+    fn forces(&self, pulls: &[Pull], stiffness: f64, z: &[[f64; 3]], forces: &mut [[f64; 3]]) {
+        for ((force, pull), z) in forces.iter_mut().zip(pulls).zip(z) {
+            *force = times(&pull.strength, *z);
+        }
         for (&[i, j], &weight) in self.ties.iter().zip(&self.weights) {
             let (i, j) = (i as usize, j as usize);
-            let force = scaled(mesh::difference(z[i], z[j]), stiffness * weight);
+            let force = scaled(difference(z[i], z[j]), stiffness * weight);
             forces[i] = add(forces[i], force);
-            forces[j] = mesh::difference(forces[j], force);
+            forces[j] = difference(forces[j], force);
         }
-        forces
-    }
-}
-
-/// Solves `A x = b` for a symmetric positive semidefinite `A` from the given `x`, preconditioned by
-/// the diagonal.
-fn conjugate_gradients(
-    apply: impl Fn(&[[f64; 3]]) -> Vec<[f64; 3]>,
-    b: &[[f64; 3]],
-    diagonal: &[[f64; 3]],
-    x: &mut [[f64; 3]],
-) {
-    let product = |a: &[[f64; 3]], b: &[[f64; 3]]| -> f64 {
-        a.iter().zip(b).map(|(a, b)| mesh::dot(*a, *b)).sum()
-    };
-    let precondition = |r: &[[f64; 3]]| -> Vec<[f64; 3]> {
-        let divide = |(r, d): (&[f64; 3], &[f64; 3])| {
-            [0, 1, 2].map(|k| if d[k] > 0.0 { r[k] / d[k] } else { 0.0 })
-        };
-        r.iter().zip(diagonal).map(divide).collect()
-    };
-    let mut residual: Vec<[f64; 3]> = b
-        .iter()
-        .zip(apply(x))
-        .map(|(b, ax)| mesh::difference(*b, ax))
-        .collect();
-    let mut conditioned = precondition(&residual);
-    let mut direction = conditioned.clone();
-    let mut slope = product(&residual, &conditioned);
-    let enough = TOLERANCE * TOLERANCE * product(b, b);
-    for _ in 0..GRADIENT_STEPS {
-        if product(&residual, &residual) <= enough || slope <= 0.0 {
-            return;
-        }
-        let applied = apply(&direction);
-        let curvature = product(&direction, &applied);
-        if curvature <= 0.0 {
-            return;
-        }
-        let step = slope / curvature;
-        for k in 0..x.len() {
-            x[k] = add(x[k], scaled(direction[k], step));
-            residual[k] = mesh::difference(residual[k], scaled(applied[k], step));
-        }
-        conditioned = precondition(&residual);
-        let next = product(&residual, &conditioned);
-        for (direction, conditioned) in direction.iter_mut().zip(&conditioned) {
-            *direction = add(*conditioned, scaled(*direction, next / slope));
-        }
-        slope = next;
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::rotation::{IDENTITY, tests::turn};
+    use super::super::rotation::tests::turn;
     use super::*;
+    use crate::geometry::linear::IDENTITY;
 
     const STIFF: Stiffness = Stiffness {
         stiffness: 1.0,
@@ -268,7 +239,7 @@ mod tests {
         {
             // Where all ties are at rest and all pulls followed nothing is left to gain; gradients
             // stop at 1e-5 of forces of about 100.
-            assert!(mesh::length(mesh::difference(goal(place), *moved)) < 1e-3);
+            assert!(length(difference(goal(place), *moved)) < 1e-3);
             for (found, wanted) in found.as_flattened().iter().zip(rotation.as_flattened()) {
                 assert!((found - wanted).abs() < 1e-3);
             }

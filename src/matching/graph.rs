@@ -8,7 +8,8 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::num::NonZeroUsize;
 
-use crate::shape::{NeighbourSearch, mesh};
+use crate::geometry::linear::dot;
+use crate::shape::NeighbourSearch;
 
 /// Neighbours that a point is linked to, itself not counted: fewer lengthen paths, more reach
 /// around edges.
@@ -40,7 +41,7 @@ impl Graph {
             let others = found.iter().filter(|neighbour| neighbour.index != from);
             for to in others {
                 let normals = (normals[from as usize], normals[to.index as usize]);
-                if mesh::dot(normals.0, normals.1) >= LEAST_AGREEMENT {
+                if dot(normals.0, normals.1) >= LEAST_AGREEMENT {
                     let length = to.squared_distance.sqrt();
                     both.push((from, to.index, length));
                     both.push((to.index, from, length));

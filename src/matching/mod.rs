@@ -187,7 +187,11 @@ fn places(
     frame: &Normalisation,
 ) -> Vec<[f64; 3]> {
     vertices
-        .map(|vertex| frame.apply(shape.vertices[vertex as usize]).map(f64::from))
+        .map(|vertex| {
+            frame
+                .apply(shape.mesh.vertices[vertex as usize])
+                .map(f64::from)
+        })
         .collect()
 }
 

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::pairs::MatchedPair;
 use super::rigid::Alignment;
-use super::rotation;
+use crate::geometry::linear::times;
 use crate::shape::{Correspondences, Normalisation};
 
 /// What is known of two shapes after matching.
@@ -125,7 +125,7 @@ impl Rigid {
     /// `R (x - c) s + t` in normalised coordinates is `R x + (c - R c + t / s)` in the user's.
     pub(super) fn new(alignment: &Alignment, frame: &Normalisation) -> Self {
         let motion = alignment.motion;
-        let turned = rotation::times(&motion.rotation, frame.centre);
+        let turned = times(&motion.rotation, frame.centre);
         let axis = |k: usize| frame.centre[k] - turned[k] + motion.translation[k] / frame.scale;
         Self {
             rotation: motion.rotation,

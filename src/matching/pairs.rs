@@ -17,7 +17,8 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::surface::{NodeMotion, Surface};
-use crate::shape::{NeighbourSearch, Normalisation, Shape, mesh};
+use crate::geometry::linear::{difference, dot, length};
+use crate::shape::{NeighbourSearch, Normalisation, Shape};
 
 /// The distance at which a pair is no longer sure, in normalised units, about the spacing of 2,500
 /// points: `tau` in the confidence `exp(-r^2 / (2 tau^2)) cos`.
@@ -47,8 +48,8 @@ pub(super) struct Sites {
 impl Sites {
     /// The vertices of a cloud, and those of a mesh that belong to a triangle.
     pub(super) fn of(shape: &Shape, surface: &Surface, normalisation: &Normalisation) -> Self {
-        let mut used = vec![!shape.is_mesh(); shape.vertices.len()];
-        for &vertex in shape.triangles.as_flattened() {
+        let mut used = vec![!shape.is_mesh(); shape.mesh.vertices.len()];
+        for &vertex in shape.mesh.triangles.as_flattened() {
             used[vertex as usize] = true;
         }
         let vertices: Vec<u32> = (0..)
@@ -58,7 +59,7 @@ impl Sites {
             .collect();
         let place = |&vertex: &u32| {
             normalisation
-                .apply(shape.vertices[vertex as usize])
+                .apply(shape.mesh.vertices[vertex as usize])
                 .map(f64::from)
         };
         let places: Vec<[f64; 3]> = vertices.iter().map(place).collect();
@@ -119,8 +120,8 @@ pub(super) fn mutual(source: (Laid<'_>, &Sites), target: (Laid<'_>, &Sites)) -> 
             return None;
         }
         let cosines = [
-            mesh::dot(there[i].1, normal(&target, j)),
-            mesh::dot(back[j].1, normal(&source, i)),
+            dot(there[i].1, normal(&target, j)),
+            dot(back[j].1, normal(&source, i)),
         ];
         let cosine = cosines[0].min(cosines[1]).clamp(0.0, 1.0);
         let square = found.squared_distance / 2.0;
@@ -167,7 +168,7 @@ fn round_trip(this: Laid<'_>, other: Laid<'_>, point: u32) -> f64 {
     let (place, normal) = this.surface.carry(this.motion, point, (start, normal));
     let anchor = other.surface.nearest_facing(place, normal);
     let (end, _) = other.surface.carry(other.motion, anchor, (place, normal));
-    mesh::length(mesh::difference(end, start))
+    length(difference(end, start))
 }
 
 /// The share of a surface's points that have one of `places` within `radius`.

@@ -7,9 +7,9 @@ use rayon::prelude::*;
 
 use super::assignment::{Likeness, Marks, pulls, sliding};
 use super::elastic::{ElasticNodes, Pull, Stiffness};
-use super::rotation::{RigidMotion, add, scaled, times};
+use super::rotation::RigidMotion;
 use super::surface::{NodeMotion, Surface};
-use crate::shape::mesh;
+use crate::geometry::linear::{add, dot, scaled, times};
 
 /// Standard deviations of distances that registration begins with, in normalised units. A wide one
 /// carries limbs far, a narrow one keeps what has hardly moved from being drawn away: each succeeds
@@ -148,7 +148,7 @@ fn fine_pulls(target: &Surface, places: &[[f64; 3]], normals: &[[f64; 3]]) -> Ve
         let (mut sum, mut to, mut facing) = (0.0, [0.0; 3], [0.0; 3]);
         for near in target.search.nearest(place, PULLING) {
             let k = near.index as usize;
-            let agreement = mesh::dot(normal, target.normals[k]);
+            let agreement = dot(normal, target.normals[k]);
             let exponent =
                 near.squared_distance / (2.0 * sigma * sigma) + NORMALS * (1.0 - agreement);
             let share = (-exponent).exp();

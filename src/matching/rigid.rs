@@ -10,11 +10,12 @@
 
 use rayon::prelude::*;
 
-use super::rotation::{
-    Matrix, RigidMotion, add_outer, determinant, mean, product, symmetric_eigen, times, transposed,
-};
+use super::rotation::RigidMotion;
 use super::surface::Surface;
-use crate::shape::mesh;
+use crate::geometry::linear::{
+    Matrix, add_outer, cross, determinant, difference, dot, mean, product, symmetric_eigen, times,
+    transposed,
+};
 
 /// Nodes of each surface that take part.
 const NODES: usize = 400;
@@ -101,8 +102,8 @@ impl<'a> Sides<'a> {
         let pair = |&(x, normal): &([f64; 3], [f64; 3])| {
             let (place, facing) = (motion.apply(x), times(&motion.rotation, normal));
             let near = other.points[other.nearest_facing(place, facing) as usize];
-            let apart = mesh::difference(near, place);
-            (x, near, mesh::dot(apart, apart))
+            let apart = difference(near, place);
+            (x, near, dot(apart, apart))
         };
         let mut pairs: Vec<_> = self.probes[from].iter().map(pair).collect();
         pairs.sort_by(|a, b| a.2.total_cmp(&b.2));
@@ -145,7 +146,7 @@ impl<'a> Sides<'a> {
             for row in 0..2 {
                 turned[row] = turned[row].map(|part| signs[row] * part);
             }
-            turned[2] = mesh::cross(turned[0], turned[1]);
+            turned[2] = cross(turned[0], turned[1]);
             rotations.push(product(&transposed(&turned), &axes[0]));
         }
         let about = |rotation| RigidMotion::about(rotation, centroids[0], centroids[1]);
@@ -182,7 +183,7 @@ fn cube_rotations() -> Vec<Matrix> {
 fn principal_axes(points: impl Iterator<Item = [f64; 3]>, centre: [f64; 3]) -> Matrix {
     let mut covariance = [[0.0; 3]; 3];
     for point in points {
-        let x = mesh::difference(point, centre);
+        let x = difference(point, centre);
         add_outer(&mut covariance, 1.0, x, x);
     }
     let (values, vectors) = symmetric_eigen(covariance);
@@ -190,13 +191,13 @@ fn principal_axes(points: impl Iterator<Item = [f64; 3]>, centre: [f64; 3]) -> M
     order.sort_by(|&i, &j| values[j].total_cmp(&values[i]));
     let column = |k: usize| [vectors[0][k], vectors[1][k], vectors[2][k]];
     let (first, second) = (column(order[0]), column(order[1]));
-    [first, second, mesh::cross(first, second)]
+    [first, second, cross(first, second)]
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::rotation::IDENTITY;
     use super::*;
+    use crate::geometry::linear::IDENTITY;
 
     #[test]
     fn a_cube_has_24_rotations_all_different_the_first_none() {

@@ -5,16 +5,9 @@
 //! "Closed-form solution of absolute orientation using unit quaternions", J. Opt. Soc. Am. A 4,
 //! 1987): always proper, also where `C` is flat or mirrored.
 
-use crate::shape::mesh;
-
-/// A 3 x 3 matrix by rows.
-pub(super) type Matrix = [[f64; 3]; 3];
-
-/// The matrix that changes nothing.
-pub(super) const IDENTITY: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-
-/// Sweeps of Jacobi rotations: a 4 x 4 matrix is diagonal to float64 after about six.
-const SWEEPS: usize = 10;
+use crate::geometry::linear::{
+    IDENTITY, Matrix, add, add_outer, difference, mean, symmetric_eigen, times, transposed,
+};
 
 /// `x -> rotation x + translation`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -66,8 +59,8 @@ impl RigidMotion {
             add_outer(
                 &mut covariance,
                 1.0,
-                mesh::difference(*y, to),
-                mesh::difference(*x, from),
+                difference(*y, to),
+                difference(*x, from),
             );
         }
         Self::about(nearest_rotation(&covariance), from, to)
@@ -76,7 +69,7 @@ impl RigidMotion {
     /// The rotation that takes the point `from` to `to`.
     pub(super) fn about(rotation: Matrix, from: [f64; 3], to: [f64; 3]) -> Self {
         Self {
-            translation: mesh::difference(to, times(&rotation, from)),
+            translation: difference(to, times(&rotation, from)),
             rotation,
         }
     }
@@ -115,91 +108,10 @@ pub(super) fn nearest_rotation(c: &Matrix) -> Matrix {
     ]
 }
 
-/// Eigenvalues of a symmetric matrix and its eigenvectors as columns, by cyclic Jacobi rotations.
-pub(super) fn symmetric_eigen<const N: usize>(mut a: [[f64; N]; N]) -> ([f64; N], [[f64; N]; N]) {
-    let mut vectors = [[0.0; N]; N];
-    for (k, row) in vectors.iter_mut().enumerate() {
-        row[k] = 1.0;
-    }
-    for _ in 0..SWEEPS {
-        for p in 0..N {
-            for q in p + 1..N {
-                if a[p][q] == 0.0 {
-                    continue;
-                }
-                // The rotation in the p-q plane that makes a[p][q] zero, by the smaller of its two
-                // angles.
-                let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
-                let tangent = theta.signum() / (theta.abs() + theta.hypot(1.0));
-                let cos = tangent.hypot(1.0).recip();
-                let sin = tangent * cos;
-                for row in a.iter_mut().chain(&mut vectors) {
-                    (row[p], row[q]) = (cos * row[p] - sin * row[q], sin * row[p] + cos * row[q]);
-                }
-                let (upper, lower) = (a[p], a[q]);
-                for k in 0..N {
-                    a[p][k] = cos * upper[k] - sin * lower[k];
-                    a[q][k] = sin * upper[k] + cos * lower[k];
-                }
-            }
-        }
-    }
-    let mut values = [0.0; N];
-    for (k, value) in values.iter_mut().enumerate() {
-        *value = a[k][k];
-    }
-    (values, vectors)
-}
-
-/// `M x`.
-pub(super) fn times(m: &Matrix, x: [f64; 3]) -> [f64; 3] {
-    [0, 1, 2].map(|row| mesh::dot(m[row], x))
-}
-
-/// `A B`.
-pub(super) fn product(a: &Matrix, b: &Matrix) -> Matrix {
-    let columns = transposed(b);
-    [0, 1, 2].map(|row| columns.map(|column| mesh::dot(a[row], column)))
-}
-
-/// `M^T`.
-pub(super) fn transposed(m: &Matrix) -> Matrix {
-    [0, 1, 2].map(|row| [0, 1, 2].map(|column| m[column][row]))
-}
-
-/// The determinant.
-pub(super) fn determinant(m: &Matrix) -> f64 {
-    mesh::dot(m[0], mesh::cross(m[1], m[2]))
-}
-
-/// `m += weight y x^T`.
-pub(super) fn add_outer(m: &mut Matrix, weight: f64, y: [f64; 3], x: [f64; 3]) {
-    for row in 0..3 {
-        for column in 0..3 {
-            m[row][column] += weight * y[row] * x[column];
-        }
-    }
-}
-
-/// `a + b`.
-pub(super) fn add(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
-}
-
-/// `a x`.
-pub(super) fn scaled(x: [f64; 3], a: f64) -> [f64; 3] {
-    x.map(|part| a * part)
-}
-
-/// The mean of points; the origin of none.
-pub(super) fn mean(points: impl ExactSizeIterator<Item = [f64; 3]>) -> [f64; 3] {
-    let count = points.len().max(1) as f64;
-    scaled(points.fold([0.0; 3], add), count.recip())
-}
-
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
+    use crate::geometry::linear::{cross, determinant, dot, length, product};
 
     /// By Rodrigues' formula about the axis (2, -1, 2) / 3.
     pub fn turn(angle: f64) -> Matrix {
@@ -208,8 +120,8 @@ pub(super) mod tests {
         let mut columns = [[0.0; 3]; 3];
         for (k, column) in columns.iter_mut().enumerate() {
             let x = IDENTITY[k];
-            let across = mesh::cross(axis, x);
-            let along = mesh::dot(axis, x) * (1.0 - cos);
+            let across = cross(axis, x);
+            let along = dot(axis, x) * (1.0 - cos);
             *column = [0, 1, 2].map(|row| cos * x[row] + sin * across[row] + along * axis[row]);
         }
         transposed(&columns)
@@ -243,7 +155,7 @@ pub(super) mod tests {
             );
             for x in points {
                 let back = found.inverse().apply(found.apply(x));
-                assert!(mesh::length(mesh::difference(back, x)) < 1e-13);
+                assert!(length(difference(back, x)) < 1e-13);
             }
         }
     }

@@ -8,10 +8,8 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::graph::Graph;
-use super::rotation::{self, Matrix, add, scaled};
-use crate::shape::{
-    NeighbourSearch, NormalSource, Normalisation, Shape, ShapeError, mesh, points_of,
-};
+use crate::geometry::linear::{Matrix, add, difference, dot, length, scaled, times};
+use crate::shape::{NeighbourSearch, NormalSource, Normalisation, Shape, ShapeError, points_of};
 
 /// Nodes that a point is carried by.
 const CARRIERS: usize = 6;
@@ -123,7 +121,7 @@ impl Surface {
     /// The point nearest to `x` that faces like `normal`; the nearest of all if none does.
     pub(super) fn nearest_facing(&self, x: [f64; 3], normal: [f64; 3]) -> u32 {
         let found = self.search.nearest(x, FACING);
-        let facing = |index: u32| mesh::dot(self.normals[index as usize], normal) > 0.0;
+        let facing = |index: u32| dot(self.normals[index as usize], normal) > 0.0;
         let first = found
             .iter()
             .find(|near| facing(near.index))
@@ -143,14 +141,14 @@ impl Surface {
         for &(node, weight) in &self.carriers[anchor as usize] {
             let start = self.points[self.nodes[node as usize] as usize];
             let turn = &motion.rotations[node as usize];
-            let turned = rotation::times(turn, mesh::difference(x, start));
+            let turned = times(turn, difference(x, start));
             place = add(
                 place,
                 scaled(add(motion.places[node as usize], turned), weight),
             );
-            facing = add(facing, scaled(rotation::times(turn, normal), weight));
+            facing = add(facing, scaled(times(turn, normal), weight));
         }
-        let length = mesh::length(facing).max(f64::MIN_POSITIVE);
+        let length = length(facing).max(f64::MIN_POSITIVE);
         (place, scaled(facing, length.recip()))
     }
 }
@@ -177,8 +175,8 @@ pub(super) fn farthest_points(points: &[[f64; 3]], count: usize) -> Vec<u32> {
         let from = points[next];
         let mut farthest = (0, 0.0);
         for (k, (point, distance)) in points.iter().zip(&mut distances).enumerate() {
-            let apart = mesh::difference(*point, from);
-            *distance = distance.min(mesh::dot(apart, apart));
+            let apart = difference(*point, from);
+            *distance = distance.min(dot(apart, apart));
             if *distance > farthest.1 {
                 farthest = (k, *distance);
             }
@@ -261,30 +259,13 @@ fn remoteness(graph: &Graph, nodes: &[u32]) -> Vec<f64> {
 mod tests {
     use super::super::rotation::{RigidMotion, tests::turn};
     use super::*;
+    use crate::geometry::testing::cuboid;
     use crate::shape::sample_surface;
 
     /// Points on the cube of this edge around the origin.
     fn cube(edge: f64, count: usize) -> Surface {
-        let corner = |k: usize| [0, 1, 2].map(|axis| edge * ((k >> axis & 1) as f64 - 0.5));
-        let faces = [
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-        ];
-        let triangles: Vec<[u32; 3]> = faces
-            .iter()
-            .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
-            .collect();
-        let corners: Vec<[f64; 3]> = (0..8).map(corner).collect();
-        let samples = sample_surface(
-            &corners,
-            &triangles,
-            count,
-            &mut ChaCha8Rng::seed_from_u64(1),
-        );
+        let cube = cuboid([edge; 3]).moved(|x| x.map(|part| part - 0.5 * edge));
+        let samples = sample_surface(&cube, count, &mut ChaCha8Rng::seed_from_u64(1));
         let normals = samples.normals.iter().map(|normal| normal.map(f64::from));
         Surface::of(samples.points, normals.collect(), 100)
     }
@@ -307,9 +288,9 @@ mod tests {
         for (k, &point) in surface.points.iter().enumerate() {
             let (place, normal) = surface.carry(&nodes, k as u32, (point, surface.normals[k]));
             // Weights that sum to 1 within a few roundings, of lengths below 1.
-            assert!(mesh::length(mesh::difference(place, motion.apply(point))) < 1e-14);
-            let turned = rotation::times(&motion.rotation, surface.normals[k]);
-            assert!(mesh::length(mesh::difference(normal, turned)) < 1e-14);
+            assert!(length(difference(place, motion.apply(point))) < 1e-14);
+            let turned = times(&motion.rotation, surface.normals[k]);
+            assert!(length(difference(normal, turned)) < 1e-14);
         }
     }
 
@@ -319,7 +300,7 @@ mod tests {
         let surface = cube(0.408, 4000);
         let nodes = surface.node_points();
         assert_eq!(nodes.len(), 100);
-        let apart = |i: usize, j: usize| mesh::length(mesh::difference(nodes[i], nodes[j]));
+        let apart = |i: usize, j: usize| length(difference(nodes[i], nodes[j]));
         for i in 0..100 {
             let nearest = (0..100)
                 .filter(|&j| j != i)

@@ -7,7 +7,9 @@ use rand_chacha::ChaCha8Rng;
 
 use super::rotation::tests::turn;
 use super::*;
-use crate::shape::{Correspondences, mesh};
+use crate::geometry::Mesh;
+use crate::geometry::linear::{add, cross, difference, length, scaled};
+use crate::shape::Correspondences;
 
 type Point = [f64; 3];
 
@@ -31,7 +33,7 @@ fn on_box(centre: Point, edges: Point, rng: &mut ChaCha8Rng) -> (Point, Point) {
     place[axis] = 0.5 * side * edges[axis];
     let mut normal = [0.0; 3];
     normal[axis] = side;
-    (rotation::add(place, centre), normal)
+    (add(place, centre), normal)
 }
 
 /// Points of a body and normals there, with a motion that has a formula.
@@ -43,24 +45,26 @@ fn cloud(points: &[(Point, Point)], motion: impl Fn(Point) -> Point) -> Shape {
         } else {
             [1.0, 0.0, 0.0]
         };
-        let tangents = [mesh::cross(normal, reference), reference];
+        let tangents = [cross(normal, reference), reference];
         let [along, across] = tangents.map(|tangent| {
-            let step = |sign: f64| motion(rotation::add(x, rotation::scaled(tangent, sign * 1e-5)));
-            mesh::difference(step(1.0), step(-1.0))
+            let step = |sign: f64| motion(add(x, scaled(tangent, sign * 1e-5)));
+            difference(step(1.0), step(-1.0))
         });
-        let normal = mesh::cross(across, along);
-        rotation::scaled(normal, mesh::length(normal).recip()).map(|part| part as f32)
+        let normal = cross(across, along);
+        scaled(normal, length(normal).recip()).map(|part| part as f32)
     };
     Shape {
         path: PathBuf::from("body.ply"),
-        vertices: points.iter().map(|point| motion(point.0)).collect(),
-        triangles: Vec::new(),
-        normals: Some(
-            points
-                .iter()
-                .map(|point| moved_normal(point.0, point.1))
-                .collect(),
-        ),
+        mesh: Mesh {
+            vertices: points.iter().map(|point| motion(point.0)).collect(),
+            triangles: Vec::new(),
+            normals: Some(
+                points
+                    .iter()
+                    .map(|point| moved_normal(point.0, point.1))
+                    .collect(),
+            ),
+        },
     }
 }
 
@@ -90,9 +94,9 @@ fn small() -> MatchOptions {
 /// greatest.
 fn errors(matching: &Matching, truth: impl Fn(u32) -> Point, target: &Shape) -> Vec<f64> {
     let error = |pair: &MatchedPair| {
-        mesh::length(mesh::difference(
+        length(difference(
             truth(pair.source),
-            target.vertices[pair.target as usize],
+            target.mesh.vertices[pair.target as usize],
         ))
     };
     let mut errors: Vec<f64> = matching.pairs.iter().map(error).collect();
@@ -114,8 +118,8 @@ fn a_rigid_motion_is_recovered_and_every_point_found() {
     let source = cloud(&points, |x| x);
     let mut target = cloud(&points, |x| motion.apply(x));
     // Another order: vertex k of the source is vertex 1999 - k of the target.
-    target.vertices.reverse();
-    target.normals.as_mut().expect("normals").reverse();
+    target.mesh.vertices.reverse();
+    target.mesh.normals.as_mut().expect("normals").reverse();
     let found = match_shapes(&source, &target, &small()).expect("matched");
     // Points are float32 once normalised, which near 3 is 2e-7.
     for (found, given) in found
@@ -252,7 +256,7 @@ fn two_near_parallel_prongs_that_move_apart_are_not_confused() {
 #[test]
 fn what_is_missing_in_the_target_stays_unmatched() {
     let hole = [0.55, 0.45, 0.0];
-    let within = |x: Point, radius: f64| mesh::length(mesh::difference(x, hole)) < radius;
+    let within = |x: Point, radius: f64| length(difference(x, hole)) < radius;
     let first = odd_body(4000, 8);
     let mut second = odd_body(4000, 9);
     // The far end of the second box, and nothing else.

@@ -4,7 +4,7 @@
 //! all surfaces of the strip and their shadows just fit into panels of the given height.
 
 use super::raster::{Panel, Projected, draw_panel};
-use crate::surface::area_weighted_normals;
+use crate::geometry::vertex_normals;
 
 /// Empty border round the surfaces, as a share of the panel height.
 const MARGIN: f32 = 0.05;
@@ -139,7 +139,7 @@ impl Camera {
     }
 
     pub(super) fn draw(&self, frame: &Frame<'_>) -> Panel {
-        let normals = area_weighted_normals(frame.vertices, frame.triangles);
+        let normals = vertex_normals(frame.vertices, frame.triangles);
         let on_ground = |&vertex: &[f32; 3]| {
             let mut vertex = vertex;
             vertex[self.up_axis] = self.ground;

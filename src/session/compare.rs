@@ -23,9 +23,10 @@ use crate::compare::{
 use crate::error::{Error, Result};
 use crate::evaluate::{GroundTruth, Reference, Span};
 use crate::event::Event;
+use crate::formats::{SurfaceFormat, write_surface};
+use crate::geometry::Mesh;
 use crate::recipe::{Preset, Recipe};
 use crate::shape::Normalisation;
-use crate::surface::write::{SurfaceFormat, SurfaceView, write_surface};
 
 /// What to compare.
 #[derive(Clone, Debug)]
@@ -261,12 +262,11 @@ impl Bench<'_> {
     fn write_ends(&self, pair: FramePair) -> Result<()> {
         let folder = self.folder(pair);
         for (frame, name) in [(pair.from, "source.ply"), (pair.to, "target.ply")] {
-            let view = SurfaceView {
-                vertices: self.truth.vertices(frame),
-                triangles: self.truth.triangles(),
-                normals: None,
-            };
-            write_surface(view, &folder.join(name), SurfaceFormat::Ply)?;
+            let mesh = Mesh::new(
+                self.truth.vertices(frame).to_vec(),
+                self.truth.triangles().to_vec(),
+            );
+            write_surface(&mesh, &folder.join(name), SurfaceFormat::Ply)?;
         }
         Ok(())
     }

@@ -7,7 +7,8 @@ use super::checkpoint::{self, Checkpoint};
 use super::folder::RunFolder;
 use crate::error::{Error, Result};
 use crate::recipe::{MethodName, Recipe};
-use crate::shape::{self, Sequence, Shape};
+use crate::formats::{self, Sequence, Shape};
+use crate::geometry::EdgeSharing;
 
 /// Says what is at a path: a shape, a sequence (`.anime`), a recipe (`.toml`) or a run.
 ///
@@ -23,7 +24,7 @@ pub fn describe(path: &Path) -> Result<String> {
         _ if path.is_dir() => run_info(path),
         "anime" => Ok(sequence_info(&Sequence::read(path)?)),
         "toml" => Ok(Recipe::read(path, &[])?.to_toml()),
-        _ => shape_info(&shape::read(path)?),
+        _ => shape_info(&formats::read(path)?),
     }
 }
 
@@ -35,15 +36,15 @@ fn shape_info(shape: &Shape) -> Result<String> {
         "point cloud"
     };
     writeln!(text, "{}: {kind}", shape.path.display())?;
-    writeln!(text, "vertices     {}", shape.vertices.len())?;
-    writeln!(text, "triangles    {}", shape.triangles.len())?;
-    let normals = if shape.normals.is_some() {
+    writeln!(text, "vertices     {}", shape.mesh.vertices.len())?;
+    writeln!(text, "triangles    {}", shape.mesh.triangles.len())?;
+    let normals = if shape.mesh.normals.is_some() {
         "given"
     } else {
         "none"
     };
     writeln!(text, "normals      {normals}")?;
-    let (low, high) = box_of(&shape.vertices);
+    let (low, high) = box_of(&shape.mesh.vertices);
     writeln!(text, "box          {low:?} to {high:?}")?;
     let estimated = if shape.is_mesh() {
         ""
@@ -52,10 +53,10 @@ fn shape_info(shape: &Shape) -> Result<String> {
     };
     writeln!(text, "area         {:.6}{estimated}", shape.area()?)?;
     if shape.is_mesh() {
-        let closed = shape::mesh::EdgeSharing::of(&shape.vertices, &shape.triangles).is_closed();
+        let closed = EdgeSharing::of(&shape.mesh).is_closed();
         writeln!(text, "closed       {}", if closed { "yes" } else { "no" })?;
         if closed {
-            let volume = shape::mesh::signed_volume(&shape.vertices, &shape.triangles);
+            let volume = shape.mesh.volume();
             writeln!(text, "volume       {volume:.6}")?;
         }
     }

@@ -8,10 +8,10 @@ use super::stop::StopFlag;
 use super::trained::{Trained, check_time};
 use crate::error::{Error, Result};
 use crate::event::Event;
+use crate::formats::SurfaceFormat;
 use crate::recipe::Recipe;
 use crate::report::picture;
 use crate::surface::frames::{Frame, FrameOptions, write_frames};
-use crate::surface::write::SurfaceFormat;
 
 /// What to write.
 #[derive(Clone, Debug, PartialEq)]

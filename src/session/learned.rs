@@ -6,8 +6,9 @@ use isomorph_training::engine::Engine;
 use super::checkpoint::Checkpoint;
 use crate::error::{Error, Result};
 use crate::recipe::{MethodName, Recipe};
-use crate::shape::{self, Bounds, Normalisation};
-use crate::surface::SurfaceMesh;
+use crate::formats;
+use crate::geometry::{Bounds, Mesh};
+use crate::shape::Normalisation;
 use crate::surface::learned::Learned;
 
 /// The frame of the key frames: where the user's coordinates lie in the networks'.
@@ -53,8 +54,8 @@ pub fn check(recipe: &Recipe, normalisation: &Normalisation) -> Result<()> {
 }
 
 /// The source's own mesh, normalised.
-fn template(recipe: &Recipe, normalisation: &Normalisation) -> Result<SurfaceMesh> {
-    let source = shape::read(&recipe.data.source)?;
+fn template(recipe: &Recipe, normalisation: &Normalisation) -> Result<Mesh<f32>> {
+    let source = formats::read(&recipe.data.source)?;
     if !source.is_mesh() {
         return Err(Error::usage(format!(
             "{}: a point cloud: the method {} gives no surface of its own and carries the source's \
@@ -63,12 +64,7 @@ fn template(recipe: &Recipe, normalisation: &Normalisation) -> Result<SurfaceMes
             recipe.method.name
         )));
     }
-    let vertices = source.vertices.iter().map(|x| normalisation.apply(*x));
-    Ok(SurfaceMesh {
-        vertices: vertices.collect(),
-        triangles: source.triangles,
-        normals: None,
-    })
+    Ok(source.mesh.moved(|x| normalisation.apply(x)))
 }
 
 /// What a checkpoint holds.

@@ -3,13 +3,13 @@
 use std::ops::ControlFlow;
 
 use crate::error::{Error, Result};
-use crate::evaluate::{Candidate, Carried, EvaluateError, Evaluation, Mesh, Purpose, Reference};
+use crate::cubes::{ExtractError, Grid, GridError};
+use crate::evaluate::{Candidate, Carried, EvaluateError, Evaluation, Purpose, Reference};
 use crate::event::Event;
 use crate::session::stop::StopFlag;
 use crate::shape::Normalisation;
-use crate::surface::SurfaceMesh;
-use crate::surface::extract::{ExtractError, Grid, GridError};
-use crate::surface::frames::FramesError;
+use crate::geometry::Mesh;
+use crate::surface::FramesError;
 use crate::surface::learned::Learned;
 
 /// Cells along the longest side where a surface only serves to find the best times.
@@ -42,7 +42,7 @@ struct Measured<'a> {
     coarse: Grid,
     /// The coarse surface extracted last, in the method's coordinates, and its time; no mesh if it had
     /// vanished.
-    anchor: Option<(f64, Option<SurfaceMesh>)>,
+    anchor: Option<(f64, Option<Mesh<f32>>)>,
 }
 
 impl<'a> Measured<'a> {
@@ -59,7 +59,7 @@ impl<'a> Measured<'a> {
     }
 
     /// The zero set of the method's field; `None` where it is empty.
-    fn extracted(&self, grid: &Grid, time: f64) -> Result<Option<SurfaceMesh>, FramesError> {
+    fn extracted(&self, grid: &Grid, time: f64) -> Result<Option<Mesh<f32>>, FramesError> {
         match self
             .learned
             .surface_at(grid, time, self.smallest, &mut |_| {})
@@ -75,7 +75,7 @@ impl<'a> Measured<'a> {
     }
 
     /// The coarse surface of a time not far from `time`, carried there.
-    fn near_anchor(&mut self, time: f64) -> Result<Option<SurfaceMesh>, FramesError> {
+    fn near_anchor(&mut self, time: f64) -> Result<Option<Mesh<f32>>, FramesError> {
         let near = (time * ANCHORS).round() / ANCHORS;
         let known = self.anchor.take().filter(|(at, _)| *at == near);
         let mesh = match known {
@@ -117,7 +117,7 @@ impl Candidate for Measured<'_> {
 
     /// The zero set of the method's field, where it is not empty; a method that only carries the source's
     /// mesh has no surface beside that one.
-    fn surface(&mut self, time: f64, purpose: Purpose) -> Result<Option<Mesh>, FramesError> {
+    fn surface(&mut self, time: f64, purpose: Purpose) -> Result<Option<Mesh<f64>>, FramesError> {
         if self.learned.deformation.field().is_none() {
             return Ok(None);
         }
@@ -126,7 +126,7 @@ impl Candidate for Measured<'_> {
             Purpose::Aligning => self.extracted(&self.coarse, time)?,
             Purpose::Measured => self.extracted(&self.fine, time)?,
         };
-        let measured = |mesh: SurfaceMesh| {
+        let measured = |mesh: Mesh<f32>| {
             let vertices = self.measured(mesh.vertices);
             Mesh::of_points(&vertices, &mesh.triangles)
         };

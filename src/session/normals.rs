@@ -6,8 +6,9 @@ use std::time::Instant;
 use serde::Serialize;
 
 use crate::error::{Error, Result};
-use crate::shape::{Shape, estimate_normals};
-use crate::surface::write::{SurfaceFormat, SurfaceView, write_surface};
+use crate::formats::{Shape, SurfaceFormat, write_surface};
+use crate::geometry::Mesh;
+use crate::shape::estimate_normals;
 
 /// Certainties from this on, up or down, are called clear.
 const CLEAR: f64 = 0.25;
@@ -15,12 +16,9 @@ const CLEAR: f64 = 0.25;
 /// Normals of a cloud with how far to trust them.
 #[derive(Clone, Debug, Serialize)]
 pub struct Estimate {
-    /// Points of the cloud.
+    /// The points, with unit normals that point out of the shape.
     #[serde(skip)]
-    pub vertices: Vec<[f64; 3]>,
-    /// Unit normals, one per point, pointing out of the shape.
-    #[serde(skip)]
-    pub normals: Vec<[f32; 3]>,
+    pub cloud: Mesh<f64>,
     /// How many there are.
     pub points: usize,
     /// Share of the points whose side the cloud as a whole shows clearly, and it is this one.
@@ -46,19 +44,22 @@ pub struct AgainstOwn {
 /// Estimates the normals of a cloud; of a mesh the vertices are taken as a cloud.
 pub fn estimate(cloud: &Shape) -> Estimate {
     let began = Instant::now();
-    let found = estimate_normals(&cloud.vertices);
+    let found = estimate_normals(&cloud.mesh.vertices);
     let seconds = began.elapsed().as_secs_f64();
     let share = |is: fn(f64) -> bool| {
         let count = found.certainty.iter().filter(|&&x| is(x)).count();
         count as f64 / found.certainty.len() as f64
     };
     Estimate {
-        vertices: cloud.vertices.clone(),
         points: found.normals.len(),
         clear: share(|certainty| certainty >= CLEAR),
         contradicted: share(|certainty| certainty <= -CLEAR),
         own: against_own(cloud, &found.normals),
-        normals: found.normals,
+        cloud: Mesh {
+            vertices: cloud.mesh.vertices.clone(),
+            triangles: Vec::new(),
+            normals: Some(found.normals),
+        },
         seconds,
     }
 }
@@ -72,18 +73,13 @@ impl Estimate {
         let format = SurfaceFormat::of(path).ok_or_else(|| {
             Error::usage(format!("{}: must end in .ply or .obj", path.display()))
         })?;
-        let view = SurfaceView {
-            vertices: &self.vertices,
-            triangles: &[],
-            normals: Some(&self.normals),
-        };
-        Ok(write_surface(view, path, format)?)
+        Ok(write_surface(&self.cloud, path, format)?)
     }
 }
 
 /// Nothing if the file has no normals, or none with a direction.
 fn against_own(cloud: &Shape, estimated: &[[f32; 3]]) -> Option<AgainstOwn> {
-    let own = cloud.normals.as_ref()?.iter().zip(estimated);
+    let own = cloud.mesh.normals.as_ref()?.iter().zip(estimated);
     let directed = own.filter(|(own, _)| **own != [0.0; 3]);
     let cosine = |(a, b): (&[f32; 3], &[f32; 3])| -> f64 {
         a.iter().zip(b).map(|(a, b)| f64::from(a * b)).sum()

@@ -6,7 +6,7 @@ use crate::atomic::write_atomically;
 use crate::compare::{ChartError, Line, Panel, line_chart};
 use crate::error::{Error, Result};
 use crate::matching::{MatchOptions, Matching, match_shapes};
-use crate::shape::Shape;
+use crate::formats::Shape;
 
 /// Finds which vertices of two shapes correspond: two poses or states of one thing, as meshes or point
 /// clouds, complete or with parts missing. The same shapes and options give the same pairs, whatever the

@@ -7,8 +7,9 @@ use crate::event::Event;
 use crate::matching::{MatchOptions, Matching, match_shapes};
 use crate::recipe::{self, Recipe};
 use crate::session::folder::RunFolder;
+use crate::formats::{self, Shape};
 use crate::shape::{
-    self, CorrespondenceSource, Correspondences, DataOptions, Keyframes, NormalSource, Shape,
+    self, CorrespondenceSource, Correspondences, DataOptions, Keyframes, NormalSource,
 };
 
 /// Shapes ready for training.
@@ -21,10 +22,10 @@ pub struct Prepared {
 /// Reads the shapes of a recipe.
 ///
 /// # Errors
-/// What [`shape::read`] refuses.
+/// What [`formats::read`] refuses.
 pub fn read(recipe: &Recipe) -> Result<Vec<Shape>> {
     let files = [&recipe.data.source, &recipe.data.target];
-    let shapes = files.into_iter().map(|path| shape::read(path));
+    let shapes = files.into_iter().map(|path| formats::read(path));
     Ok(shapes.collect::<std::result::Result<_, _>>()?)
 }
 

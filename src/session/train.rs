@@ -18,7 +18,7 @@ use crate::error::{Error, Result};
 use crate::event::Event;
 use crate::recipe::Recipe;
 use crate::session::extract::ExtractOptions;
-use crate::shape::Shape;
+use crate::formats::Shape;
 
 /// A run that is about to be trained: a recipe, its shapes, a folder and a backend.
 ///
@@ -50,7 +50,7 @@ use crate::shape::Shape;
 /// let mut session = Session::prepare(recipe, place.path().join("run"), Backend::Flex)?;
 /// let trained = session.train(|event| eprintln!("{event}"))?;
 /// let surface = trained.surface(0.5, 48)?;
-/// println!("{} triangles", surface.triangles.len());
+/// println!("{} triangles", surface.mesh.triangles.len());
 /// # Ok(())
 /// # }
 /// ```

@@ -6,10 +6,11 @@ use super::checkpoint::Checkpoint;
 use super::folder::RunFolder;
 use super::learned;
 use crate::backend::Backend;
+use crate::cubes::Grid;
 use crate::error::{Error, Result};
+use crate::geometry::Mesh;
 use crate::recipe::Recipe;
 use crate::shape::Normalisation;
-use crate::surface::extract::Grid;
 use crate::surface::learned::Learned;
 
 /// A trained run. Everything goes in and comes out in the coordinates of its shapes.
@@ -56,12 +57,9 @@ pub struct Trained {
 pub struct Surface {
     /// The time, 0 to 1.
     pub time: f64,
-    /// Vertex positions.
-    pub vertices: Vec<[f64; 3]>,
-    /// Vertex indices, counter-clockwise seen from outside.
-    pub triangles: Vec<[u32; 3]>,
-    /// Unit normals of the vertices, pointing outwards.
-    pub normals: Vec<[f32; 3]>,
+    /// Vertices, triangles that are counter-clockwise seen from outside, and unit normals that point
+    /// outwards.
+    pub mesh: Mesh<f64>,
     /// Connected pieces.
     pub components: usize,
     /// Pieces that were too small to be kept (`result.smallest-component`).
@@ -145,12 +143,11 @@ impl Trained {
         let grid = Grid::new(learned.bounds.min, learned.bounds.max, resolution)?;
         let found = learned.surface_at(&grid, t, self.recipe.result.smallest_component, &mut progress)?;
         let (normals, _) = learned.normals(&found.mesh, t);
-        let vertices = found.mesh.vertices.iter();
+        let mut mesh = found.mesh.moved(|x| learned.normalisation.invert(x));
+        mesh.normals = Some(normals);
         Ok(Surface {
             time: t,
-            vertices: vertices.map(|x| learned.normalisation.invert(*x)).collect(),
-            triangles: found.mesh.triangles,
-            normals,
+            mesh,
             components: found.components,
             left_out: found.left_out,
             touches_box: found.touches_box,

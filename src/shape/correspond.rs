@@ -10,7 +10,7 @@ use std::path::Path;
 
 use rand::Rng;
 
-use super::{Shape, ShapeError};
+use crate::formats::{Shape, ShapeError, file_length};
 
 /// Known pairs: indices into the vertices of the source and of the target.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -26,7 +26,7 @@ impl Correspondences {
     /// The file and the line, where a line is not two whole numbers or a vertex does not exist;
     /// [`ShapeError::NoCorrespondences`] if it holds no pair at all.
     pub fn read_csv(path: &Path, source: &Shape, target: &Shape) -> Result<Self, ShapeError> {
-        super::file_length(path)?;
+        file_length(path)?;
         let unreadable = |reason| ShapeError::Unreadable {
             path: path.to_owned(),
             reason,
@@ -50,8 +50,8 @@ impl Correspondences {
                 ShapeError::line(path, at + 1, format!("{shown:?}: {allowed}"))
             })?;
             for (index, shape) in pair.into_iter().zip([source, target]) {
-                if index >= shape.vertices.len() as u64 {
-                    let (count, name) = (shape.vertices.len(), shape.path.display());
+                if index >= shape.mesh.vertices.len() as u64 {
+                    let (count, name) = (shape.mesh.vertices.len(), shape.path.display());
                     let problem = format!(
                         "vertex {index} of {name} does not exist (it has {count}: 0 to {})",
                         count - 1
@@ -74,16 +74,16 @@ impl Correspondences {
     /// # Errors
     /// [`ShapeError::VertexCounts`] if the shapes have different numbers of vertices.
     pub fn same_vertices(source: &Shape, target: &Shape) -> Result<Self, ShapeError> {
-        if source.vertices.len() != target.vertices.len() {
+        if source.mesh.vertices.len() != target.mesh.vertices.len() {
             return Err(ShapeError::VertexCounts {
                 source_path: source.path.clone(),
-                source_vertices: source.vertices.len(),
+                source_vertices: source.mesh.vertices.len(),
                 target_path: target.path.clone(),
-                target_vertices: target.vertices.len(),
+                target_vertices: target.mesh.vertices.len(),
             });
         }
         Ok(Self {
-            pairs: (0..source.vertices.len() as u32)
+            pairs: (0..source.mesh.vertices.len() as u32)
                 .map(|index| [index; 2])
                 .collect(),
         })
@@ -121,15 +121,17 @@ mod tests {
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
+    use proptest::prelude::*;
+
     use super::*;
+    use crate::formats::malformed::{damage, read_damaged};
+    use crate::geometry::Mesh;
 
     fn cloud(name: &str, count: usize) -> Shape {
         let vertices = (0..count).map(|i| [i as f64, 0.0, 0.0]).collect();
         Shape {
             path: PathBuf::from(name),
-            vertices,
-            triangles: Vec::new(),
-            normals: None,
+            mesh: Mesh::new(vertices, Vec::new()),
         }
     }
 
@@ -231,5 +233,26 @@ mod tests {
         assert_eq!(drawn, draw(50, 5));
         assert_ne!(drawn, draw(50, 6));
         assert_eq!(draw(5000, 5), all.pairs);
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 1000, failure_persistence: None, ..Default::default() })]
+
+        #[test]
+        fn damaged_correspondences_are_read_or_refused(damage in damage()) {
+            let vertices = (0..100).map(|i| [f64::from(i); 3]).collect();
+            let path = "shape.ply".into();
+            let shape = Shape { path, mesh: Mesh::new(vertices, Vec::new()) };
+            let bytes = b"# pairs\nsource,target\n0,1\n 2 , 3\n99,99\n".to_vec();
+            let read = |path: &Path| Correspondences::read_csv(path, &shape, &shape);
+            let (result, _) = read_damaged("shape.csv", bytes, &damage, read);
+            match result {
+                Ok(found) => {
+                    prop_assert!(!found.pairs.is_empty());
+                    prop_assert!(found.pairs.iter().flatten().all(|&index| index < 100));
+                }
+                Err(error) => prop_assert!(!error.to_string().contains('\n'), "{}", error),
+            }
+        }
     }
 }

@@ -14,8 +14,10 @@ use std::num::NonZeroUsize;
 
 use rayon::prelude::*;
 
-use super::winding::{self, Charges, SummationTree};
-use super::{NeighbourSearch, mesh};
+use crate::geometry::NeighbourSearch;
+use crate::geometry::density::{self, areas, squared_spacing};
+use crate::geometry::linear::{difference, dot};
+use crate::geometry::winding::{Charges, SummationTree};
 
 /// Nearest points whose planes are averaged.
 const PLANES: NonZeroUsize = NonZeroUsize::new(4).expect("4 is not 0");
@@ -48,16 +50,14 @@ impl SignedDistance {
         assert_eq!(points.len(), normals.len(), "one normal per point");
         let points: Vec<[f64; 3]> = points.iter().map(|point| point.map(f64::from)).collect();
         let search = NeighbourSearch::new(&points);
-        let neighbours = search.nearest_of_each(&points, winding::NEIGHBOURS);
-        let spacings = neighbours
-            .par_iter()
-            .map(|found| winding::squared_spacing(found));
+        let neighbours = search.nearest_of_each(&points, density::NEIGHBOURS);
+        let spacings = neighbours.par_iter().map(|found| squared_spacing(found));
         let softening: Vec<f64> = spacings.collect();
         let spacing = (softening.iter().sum::<f64>() / points.len() as f64).sqrt();
         let tree = SummationTree::new(&points, &softening);
         let dipoles = normals
             .iter()
-            .zip(winding::areas(&neighbours))
+            .zip(areas(&neighbours))
             .map(|(normal, area)| normal.map(|n| f64::from(n) * area));
         let dipoles = tree.charges(&dipoles.collect::<Vec<_>>());
         let some = points.par_iter().step_by(points.len().div_ceil(LEVELS));
@@ -85,7 +85,7 @@ impl SignedDistance {
             let k = neighbour.index as usize;
             let normal = self.normals[k].map(f64::from);
             let weight = 1.0 / (neighbour.squared_distance + 1e-3 * reach);
-            height += weight * mesh::dot(mesh::difference(x, self.points[k]), normal);
+            height += weight * dot(difference(x, self.points[k]), normal);
             total += weight;
         }
         let plane = height / total;
@@ -104,8 +104,8 @@ impl SignedDistance {
 
 #[cfg(test)]
 mod tests {
-    use super::super::testing::sphere_cloud;
     use super::*;
+    use crate::geometry::testing::sphere_cloud;
 
     #[test]
     fn it_is_the_distance_to_a_sphere_inside_and_out() {

@@ -12,13 +12,14 @@ use isomorph_training::data::{KeyPoints, PointPair, Surroundings, TrainingData};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::mesh::{self, EdgeSharing};
-use super::sample::point_at;
-use super::winding::is_inside_out;
-use super::{
-    Bounds, Correspondences, FEWEST_POINTS, NeighbourSearch, Normalisation, Shape, ShapeError,
-    SignedDistance, estimate_normals, sample_surface,
-};
+use super::correspond::Correspondences;
+use super::distance::SignedDistance;
+use super::normalise::Normalisation;
+use super::normals::estimate_normals;
+use super::sample::{point_at, sample_surface};
+use crate::formats::{FEWEST_POINTS, Shape, ShapeError};
+use crate::geometry::winding::is_inside_out;
+use crate::geometry::{Bounds, EdgeSharing, NeighbourSearch};
 
 /// Where correspondences come from.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -244,7 +245,7 @@ pub(crate) fn points_of(
 ) -> Result<Points, ShapeError> {
     let name = shape.path.display();
     let (points, given) = if shape.is_mesh() {
-        let samples = sample_surface(&shape.vertices, &shape.triangles, count, rng);
+        let samples = sample_surface(&shape.mesh, count, rng);
         let normals = match wanted {
             NormalSource::Auto => outward(shape, samples.normals, notes),
             _ => Some(samples.normals),
@@ -263,14 +264,14 @@ pub(crate) fn points_of(
         }
         // Not turned, as a closed mesh's are: of a cloud nobody knows whether it is closed.
         if let (NormalSource::Auto, Ok(normals)) = (wanted, &normals)
-            && is_inside_out(&shape.vertices, normals)
+            && is_inside_out(&shape.mesh.vertices, normals)
         {
             notes.push(format!(
                 "{name}: the file's normals point inwards on the whole: taken as they are; if the shape is \
                  closed, set data.normals = \"estimate\" or turn them"
             ));
         }
-        (shape.vertices.clone(), normals.ok())
+        (shape.mesh.vertices.clone(), normals.ok())
     };
     let normals = match wanted {
         NormalSource::None => None,
@@ -284,7 +285,11 @@ pub(crate) fn points_of(
 
 /// A cloud's own normals, or why they do not serve.
 fn usable_normals(shape: &Shape) -> Result<Vec<[f32; 3]>, String> {
-    let normals = shape.normals.as_ref().ok_or("the file has no normals")?;
+    let normals = shape
+        .mesh
+        .normals
+        .as_ref()
+        .ok_or("the file has no normals")?;
     match normals.iter().filter(|&normal| normal == &[0.0; 3]).count() {
         0 => Ok(normals.clone()),
         lost => Err(format!(
@@ -301,7 +306,7 @@ fn outward(
     notes: &mut Vec<String>,
 ) -> Option<Vec<[f32; 3]>> {
     let name = shape.path.display();
-    let sharing = EdgeSharing::of(&shape.vertices, &shape.triangles);
+    let sharing = EdgeSharing::of(&shape.mesh);
     if sharing.inconsistent > 0 {
         let edges = sharing.inconsistent;
         notes.push(format!(
@@ -318,7 +323,7 @@ fn outward(
             "{name}: the mesh is not closed ({open} open edges, {branching} of more than two \
              triangles): its normals are taken as its triangles are wound"
         ));
-    } else if mesh::signed_volume(&shape.vertices, &shape.triangles) < 0.0 {
+    } else if shape.mesh.volume() < 0.0 {
         notes.push(format!(
             "{name}: triangles are wound inwards: normals flipped"
         ));
@@ -349,7 +354,7 @@ fn correspondences(
     let points = if source.is_mesh() {
         options.points
     } else {
-        source.vertices.len()
+        source.mesh.vertices.len()
     };
     // A fraction that is not a number gives 0, as does a negative one.
     let count = (points as f64 * options.correspondence_fraction).round() as usize;
@@ -364,23 +369,27 @@ fn correspondences(
         });
     }
     let shared = *from == CorrespondenceSource::SameVertices;
-    if shared && source.is_mesh() && source.triangles == target.triangles {
+    if shared && source.is_mesh() && source.mesh.triangles == target.mesh.triangles {
         return Ok(surface_pairs(source, target, count, &mut rng));
     }
     let chosen = available.drawn(count, &mut rng).pairs.into_iter();
-    let place =
-        |[from, to]: [u32; 2]| (source.vertices[from as usize], target.vertices[to as usize]);
+    let place = |[from, to]: [u32; 2]| {
+        (
+            source.mesh.vertices[from as usize],
+            target.mesh.vertices[to as usize],
+        )
+    };
     Ok(chosen.map(place).collect())
 }
 
 /// Points at equal barycentric coordinates of two meshes that share their triangles, drawn by area
 /// of the source.
 fn surface_pairs(source: &Shape, target: &Shape, count: usize, rng: &mut ChaCha8Rng) -> PointPairs {
-    let samples = sample_surface(&source.vertices, &source.triangles, count, rng);
+    let samples = sample_surface(&source.mesh, count, rng);
     let places = samples.faces.iter().zip(&samples.barycentric);
     let moved = places.map(|(&face, weights)| {
-        let triangle = target.triangles[face as usize];
-        point_at(&target.vertices, triangle, weights.map(f64::from))
+        let triangle = target.mesh.triangles[face as usize];
+        point_at(&target.mesh, triangle, weights.map(f64::from))
     });
     samples.points.iter().copied().zip(moved).collect()
 }

@@ -22,17 +22,15 @@ use std::num::NonZeroUsize;
 
 use rayon::prelude::*;
 
-use super::winding::{areas, squared_spacing};
-use super::{Neighbour, NeighbourSearch, mesh};
+use crate::geometry::density::{areas, squared_spacing};
+use crate::geometry::linear::{add_outer, column, difference, mean, symmetric_eigen, unit};
+use crate::geometry::{Neighbour, NeighbourSearch};
 
 /// Neighbours that the plane is fitted to, the point itself included.
 const NEIGHBOURS: NonZeroUsize = NonZeroUsize::new(12).expect("not zero");
 
 /// Squared heights about the fitted plane that a point's place is softened by: two deviations.
 const NOISE: f64 = 4.0;
-
-/// Sweeps of Jacobi rotations: a 3 x 3 matrix is diagonal to float64 after about five.
-const SWEEPS: usize = 8;
 
 /// What is known of the normals of a raw cloud.
 #[derive(Debug, Clone, PartialEq)]
@@ -57,7 +55,7 @@ pub fn estimate_normals(points: &[[f64; 3]]) -> EstimatedNormals {
     let (lines, softening): (Vec<[f64; 3]>, Vec<f64>) = neighbours.par_iter().map(fit).unzip();
     let evidence = evidence::outward(points, &lines, &areas(&neighbours), &softening);
     let signs = propagate::signs(points, &lines, &neighbours, &evidence);
-    let turned = |(line, sign): (&[f64; 3], &f64)| super::unit(line.map(|x| x * sign));
+    let turned = |(line, sign): (&[f64; 3], &f64)| unit(line.map(|x| x * sign));
     EstimatedNormals {
         normals: lines.iter().zip(&signs).map(turned).collect(),
         certainty: signs.iter().zip(evidence).map(|(s, e)| s * e).collect(),
@@ -68,49 +66,16 @@ pub fn estimate_normals(points: &[[f64; 3]]) -> EstimatedNormals {
 fn tangent_plane(points: &[[f64; 3]], neighbours: &[Neighbour]) -> ([f64; 3], f64) {
     let count = neighbours.len() as f64;
     let places = neighbours.iter().map(|found| points[found.index as usize]);
-    let mean = mesh::mean(places.clone());
+    let mean = mean(places.clone());
     let mut covariance = [[0.0; 3]; 3];
     for place in places {
-        let x = mesh::difference(place, mean);
-        for row in 0..3 {
-            for column in 0..3 {
-                covariance[row][column] += x[row] * x[column] / count;
-            }
-        }
+        let x = difference(place, mean);
+        add_outer(&mut covariance, count.recip(), x, x);
     }
-    least_eigenvector(covariance)
-}
-
-/// The eigenvector of a symmetric matrix with the least eigenvalue, and that eigenvalue, by cyclic
-/// Jacobi rotations.
-fn least_eigenvector(mut a: [[f64; 3]; 3]) -> ([f64; 3], f64) {
-    // Columns of `vectors` become the eigenvectors, the diagonal of `a` the eigenvalues.
-    let mut vectors = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-    for (p, q) in [(0, 1), (0, 2), (1, 2)].repeat(SWEEPS) {
-        if a[p][q] == 0.0 {
-            continue;
-        }
-        // The rotation in the p-q plane that makes a[p][q] zero, by the smaller of its two angles.
-        let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
-        let tangent = theta.signum() / (theta.abs() + theta.hypot(1.0));
-        let cos = tangent.hypot(1.0).recip();
-        let sin = tangent * cos;
-        for row in &mut a {
-            (row[p], row[q]) = (cos * row[p] - sin * row[q], sin * row[p] + cos * row[q]);
-        }
-        let (upper, lower) = (a[p], a[q]);
-        a[p] = [0, 1, 2].map(|column| cos * upper[column] - sin * lower[column]);
-        a[q] = [0, 1, 2].map(|column| sin * upper[column] + cos * lower[column]);
-        for row in &mut vectors {
-            (row[p], row[q]) = (cos * row[p] - sin * row[q], sin * row[p] + cos * row[q]);
-        }
-    }
-    let least = [0, 1, 2]
-        .into_iter()
-        .min_by(|&i, &j| a[i][i].total_cmp(&a[j][j]));
+    let (values, vectors) = symmetric_eigen(covariance);
+    let least = (0..3).min_by(|&i, &j| values[i].total_cmp(&values[j]));
     let least = least.expect("three eigenvalues");
-    let vector = [vectors[0][least], vectors[1][least], vectors[2][least]];
-    (vector, a[least][least])
+    (column(&vectors, least), values[least])
 }
 
 #[cfg(test)]
@@ -120,7 +85,8 @@ mod tests {
     use rand_distr::{Distribution, Normal};
 
     use super::*;
-    use crate::shape::testing::{sphere_cloud, torus_cloud};
+    use crate::geometry::linear::dot;
+    use crate::geometry::testing::{sphere_cloud, torus_cloud};
 
     /// The share of normals within 90 degrees of the true ones, and the mean angle between the
     /// lines in degrees.
@@ -129,7 +95,7 @@ mod tests {
         let cosines = estimated
             .iter()
             .zip(truth)
-            .map(|(a, b)| mesh::dot(a.map(f64::from), *b));
+            .map(|(a, b)| dot(a.map(f64::from), *b));
         let cosines: Vec<f64> = cosines.collect();
         let count = cosines.len() as f64;
         let outward = cosines.iter().filter(|&&cosine| cosine > 0.0).count() as f64 / count;
@@ -223,25 +189,6 @@ mod tests {
         let (outward, _) = quality(&points, &directions);
         // Those that are wrong are planes that stand on edge, 2.9 % of them. Measured 0.996.
         assert!(outward > 0.99, "{outward}");
-    }
-
-    #[test]
-    fn the_least_eigenvector_is_that_of_a_matrix_built_from_it() {
-        let least = [0.36, 0.48, 0.8];
-        let other = [0.8, -0.6, 0.0];
-        let third = mesh::cross(least, other);
-        let mut matrix = [[0.0; 3]; 3];
-        for (value, vector) in [(0.1, least), (2.0, other), (5.0, third)] {
-            for row in 0..3 {
-                for column in 0..3 {
-                    matrix[row][column] += value * vector[row] * vector[column];
-                }
-            }
-        }
-        // Jacobi is accurate to a few roundings of the largest entry.
-        let (vector, value) = least_eigenvector(matrix);
-        assert!((mesh::dot(vector, least).abs() - 1.0).abs() < 1e-14);
-        assert!((value - 0.1).abs() < 1e-14);
     }
 
     #[test]

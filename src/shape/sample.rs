@@ -6,7 +6,8 @@
 
 use rand::{Rng, RngExt};
 
-use super::{mesh, unit};
+use crate::geometry::Mesh;
+use crate::geometry::linear::{length, unit};
 
 /// Points on a surface and where on it they are; all lists have the same length.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,17 +28,13 @@ pub struct SurfaceSamples {
 /// platform: only IEEE arithmetic and square roots are used.
 ///
 /// # Panics
-/// If the mesh has no area, or indices out of range: a [`super::Shape`] that was read has neither.
-pub fn sample_surface(
-    vertices: &[[f64; 3]],
-    triangles: &[[u32; 3]],
-    count: usize,
-    rng: &mut impl Rng,
-) -> SurfaceSamples {
+/// If the mesh has no area, or indices out of range: a [`Shape`](crate::formats::Shape) that was read has neither.
+pub fn sample_surface(mesh: &Mesh<f64>, count: usize, rng: &mut impl Rng) -> SurfaceSamples {
+    let triangles = &mesh.triangles;
     let mut total = 0.0;
     let mut running = Vec::with_capacity(triangles.len());
     for &triangle in triangles {
-        total += mesh::length(mesh::area_vector(vertices, triangle));
+        total += length(mesh.area_vector(triangle));
         running.push(total);
     }
     assert!(
@@ -60,10 +57,10 @@ pub fn sample_surface(
         let weights = uniform_barycentric(rng);
         samples
             .points
-            .push(point_at(vertices, triangles[face], weights));
+            .push(point_at(mesh, triangles[face], weights));
         samples
             .normals
-            .push(unit(mesh::area_vector(vertices, triangles[face])));
+            .push(unit(mesh.area_vector(triangles[face])));
         samples.faces.push(face as u32);
         samples
             .barycentric
@@ -83,8 +80,8 @@ fn uniform_barycentric(rng: &mut impl Rng) -> [f64; 3] {
 /// Reckoned from the first corner, whose own weight is what the others leave: far from the origin
 /// the rounding of weights that sum to nearly 1 would move the point by their error times the
 /// distance.
-pub(super) fn point_at(vertices: &[[f64; 3]], triangle: [u32; 3], weights: [f64; 3]) -> [f64; 3] {
-    let [a, b, c] = mesh::corners(vertices, triangle);
+pub(super) fn point_at(mesh: &Mesh<f64>, triangle: [u32; 3], weights: [f64; 3]) -> [f64; 3] {
+    let [a, b, c] = mesh.corners(triangle);
     let [_, second, third] = weights;
     [0, 1, 2].map(|axis| a[axis] + second * (b[axis] - a[axis]) + third * (c[axis] - a[axis]))
 }
@@ -95,9 +92,10 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
+    use crate::geometry::linear::difference;
 
     /// A 3 x 1 strip in the plane z = 2 of three triangles with areas 0, 1/2 and 1, and a point.
-    fn strip() -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
+    fn strip() -> Mesh<f64> {
         let vertices = vec![
             [0.0, 0.0, 2.0],
             [1.0, 0.0, 2.0],
@@ -106,15 +104,15 @@ mod tests {
             [3.0, 0.0, 2.0],
             [3.0, 1.0, 2.0],
         ];
-        (vertices, vec![[0, 1, 1], [0, 1, 2], [3, 4, 5], [2, 2, 2]])
+        Mesh::new(vertices, vec![[0, 1, 1], [0, 1, 2], [3, 4, 5], [2, 2, 2]])
     }
 
     #[test]
     fn triangles_are_chosen_by_area_and_degenerate_ones_never() {
-        let (vertices, triangles) = strip();
+        let strip = strip();
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         let count = 30_000;
-        let samples = sample_surface(&vertices, &triangles, count, &mut rng);
+        let samples = sample_surface(&strip, count, &mut rng);
         let share = |face| {
             samples.faces.iter().filter(|&&found| found == face).count() as f64 / count as f64
         };
@@ -131,25 +129,26 @@ mod tests {
 
     #[test]
     fn points_fill_each_triangle_evenly_and_match_their_barycentric_coordinates() {
-        let (vertices, triangles) = strip();
+        let mut strip = strip();
+        strip.triangles = vec![strip.triangles[1]];
         let mut rng = ChaCha8Rng::seed_from_u64(2);
-        let samples = sample_surface(&vertices, &triangles[1..2], 30_000, &mut rng);
+        let samples = sample_surface(&strip, 30_000, &mut rng);
         let mean = |axis| samples.points.iter().map(|p| p[axis]).sum::<f64>() / 30_000.0;
         // The centroid is (1/3, 1/3); a coordinate deviates by 0.236, its mean by 0.0014: five.
         assert!((mean(0) - 1.0 / 3.0).abs() < 0.007 && (mean(1) - 1.0 / 3.0).abs() < 0.007);
         for (point, weights) in samples.points.iter().zip(&samples.barycentric) {
-            let again = point_at(&vertices, triangles[1], weights.map(f64::from));
+            let again = point_at(&strip, strip.triangles[0], weights.map(f64::from));
             // The weights are rounded to float32 and the corners are at most 3 away.
-            assert!(mesh::length(mesh::difference(*point, again)) < 1e-6);
+            assert!(length(difference(*point, again)) < 1e-6);
         }
     }
 
     #[test]
     fn a_seed_names_the_same_points_everywhere() {
-        let (vertices, triangles) = strip();
+        let strip = strip();
         let draw = |seed| {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
-            sample_surface(&vertices, &triangles, 3, &mut rng)
+            sample_surface(&strip, 3, &mut rng)
         };
         assert_eq!(draw(7), draw(7));
         assert_ne!(draw(7), draw(8));

@@ -2,7 +2,7 @@
 
 use isomorph_training::deformation::SurfaceField;
 
-use super::frames::FramesError;
+use super::error::FramesError;
 use super::learned::{Learned, some_of};
 
 /// The most vertices of a surface that are looked at.

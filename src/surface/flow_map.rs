@@ -9,7 +9,7 @@
 use isomorph_training::deformation::CarriedField;
 use rayon::prelude::*;
 
-use super::extract::Grid;
+use crate::cubes::Grid;
 
 /// The longest side of a cell of the first lattice tried, in normalised units.
 const LONGEST: f64 = 0.025;

@@ -5,19 +5,17 @@
 //! `[{"time": t, "surface": "surface-000.ply", "slope_error": 0.02, "consistency": 0.001,
 //! "round_trip": 1e-7, "carried": "carried-000.ply"}, …]`.
 
-use std::convert::Infallible;
 use std::io;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::SurfaceMesh;
-use super::carry::{CarryError, rewrite_vertices};
-use super::extract::{ExtractError, Grid, GridError};
+use super::error::{FramesError, no_motion};
 use super::learned::{Found, Learned};
-use super::write::{SurfaceFormat, SurfaceView, WriteError, write_surface};
 use crate::atomic::write_atomically;
-use crate::shape::{self, ShapeError};
+use crate::cubes::Grid;
+use crate::formats::{self, SurfaceFormat, rewrite_vertices, write_surface};
+use crate::geometry::Mesh;
 
 /// What to write.
 #[derive(Clone, Debug, PartialEq)]
@@ -76,7 +74,7 @@ pub struct Frame {
     /// Its entry in `frames.json`.
     pub entry: FrameEntry,
     /// The surface in normalised coordinates.
-    pub mesh: SurfaceMesh,
+    pub mesh: Mesh<f32>,
     /// Connected pieces.
     pub components: usize,
     /// Pieces that were too small to be kept.
@@ -85,37 +83,6 @@ pub struct Frame {
     pub touches_box: bool,
     /// The share of the grid's nodes at which f was evaluated.
     pub evaluated: f64,
-}
-
-/// Why a frame cannot be written.
-#[derive(Debug, thiserror::Error)]
-pub enum FramesError {
-    /// The grid cannot be made.
-    #[error(transparent)]
-    Grid(#[from] GridError),
-    /// Nothing moves points.
-    #[error("{0}")]
-    NoMotion(String),
-    /// No surface at a time.
-    #[error("time {time}: {reason}")]
-    Extract {
-        /// The time.
-        time: f64,
-        /// Why.
-        reason: ExtractError<Infallible>,
-    },
-    /// The shape to be carried cannot be read.
-    #[error(transparent)]
-    Shape(#[from] ShapeError),
-    /// The carried shape cannot be written.
-    #[error(transparent)]
-    Carry(#[from] CarryError),
-    /// A surface cannot be written.
-    #[error(transparent)]
-    Write(#[from] WriteError),
-    /// `frames.json` cannot be written, or an event cannot be recorded.
-    #[error(transparent)]
-    Io(#[from] io::Error),
 }
 
 /// Writes the frames and `frames.json`; `done` is told of each and may stop the work by returning false.
@@ -163,11 +130,6 @@ pub fn write_frames(
     Ok(frames)
 }
 
-pub(super) fn no_motion() -> FramesError {
-    let text = "this method gives a surface and moves no points, so nothing can be carried";
-    FramesError::NoMotion(text.to_owned())
-}
-
 /// Reads and removes the listing of an earlier extraction; none, or not ours, is an empty one.
 fn take_listing(listing: &Path) -> io::Result<Vec<FrameEntry>> {
     let Ok(text) = std::fs::read_to_string(listing) else {
@@ -198,16 +160,9 @@ fn write_frame(
         evaluated,
     } = learned.surface_at(grid, time, options.smallest_component, &mut |_| {})?;
     let (normals, slope_error) = learned.normals(&mesh, time);
-    let vertices = mesh
-        .vertices
-        .iter()
-        .map(|x| learned.normalisation.invert(*x));
-    let view = SurfaceView {
-        vertices: &vertices.collect::<Vec<[f64; 3]>>(),
-        triangles: &mesh.triangles,
-        normals: Some(&normals),
-    };
-    write_surface(view, &options.folder.join(&surface), options.format)?;
+    let mut placed = mesh.moved(|x| learned.normalisation.invert(x));
+    placed.normals = Some(normals);
+    write_surface(&placed, &options.folder.join(&surface), options.format)?;
     let agreement = learned.agreement(&mesh.vertices, time)?;
     let entry = FrameEntry {
         time,
@@ -233,9 +188,9 @@ fn carry(
     source: &Path,
     options: &FrameOptions,
 ) -> Result<Vec<Option<String>>, FramesError> {
-    let shape = shape::read(source)?;
-    let start: Vec<[f32; 3]> = shape
-        .vertices
+    let shape = formats::read(source)?;
+    let vertices = &shape.mesh.vertices;
+    let start: Vec<[f32; 3]> = vertices
         .iter()
         .map(|x| learned.normalisation.apply(*x))
         .collect();
@@ -250,7 +205,7 @@ fn carry(
     let path = learned.path(&start, &times)?;
     for (k, now) in order.into_iter().zip(path) {
         // The displacement is added to the vertex as it was read, so that time 0 gives the input back.
-        let moved: Vec<[f64; 3]> = (shape.vertices.iter().zip(&start).zip(&now))
+        let moved: Vec<[f64; 3]> = (vertices.iter().zip(&start).zip(&now))
             .map(|((vertex, start), now)| learned.normalisation.displaced(*vertex, *start, *now))
             .collect();
         let name = format!("carried-{k:03}.{extension}");

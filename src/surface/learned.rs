@@ -4,10 +4,10 @@ use std::convert::Infallible;
 
 use isomorph_training::deformation::{CarriedField, Deformation, PointMotion, SurfaceField};
 
-use super::SurfaceMesh;
-use super::extract::{Extraction, Grid, extract};
+use super::error::{FramesError, no_motion};
 use super::flow_map::{FlowMap, first_stride};
-use super::frames::{FramesError, no_motion};
+use crate::cubes::{Extraction, Grid, extract};
+use crate::geometry::Mesh;
 use crate::shape::{Bounds, Normalisation};
 
 /// The most vertices at which an interpolated flow is compared with the flow itself.
@@ -18,7 +18,7 @@ pub struct Learned {
     /// The field and the motion, each if the method has one.
     pub deformation: Box<dyn Deformation>,
     /// A mesh at time 0, normalised, that the motion carries: of methods that have no field.
-    pub template: Option<SurfaceMesh>,
+    pub template: Option<Mesh<f32>>,
     /// From the user's coordinates to the networks'.
     pub normalisation: Normalisation,
     /// The box in which the surface is looked for, normalised.
@@ -29,7 +29,7 @@ pub struct Learned {
 #[derive(Clone, Debug)]
 pub struct Found {
     /// In normalised coordinates.
-    pub mesh: SurfaceMesh,
+    pub mesh: Mesh<f32>,
     /// Its connected pieces.
     pub components: usize,
     /// Pieces that were too small to be kept.
@@ -89,9 +89,9 @@ impl Learned {
 
     /// Unit normals of a surface, and the mean of `||grad f| - 1|` over its vertices where it is the zero
     /// set of a field `f`.
-    pub(crate) fn normals(&self, mesh: &SurfaceMesh, time: f64) -> (Vec<[f32; 3]>, Option<f64>) {
+    pub(crate) fn normals(&self, mesh: &Mesh<f32>, time: f64) -> (Vec<[f32; 3]>, Option<f64>) {
         let Some(field) = self.deformation.field() else {
-            return (mesh.area_weighted_normals(), None);
+            return (mesh.vertex_normals(), None);
         };
         let gradients = field.gradients(&mesh.vertices, time);
         let unit = |gradient: &[f32; 3]| {
@@ -318,10 +318,7 @@ mod tests {
     #[test]
     fn normals_are_unit_gradients_and_their_length_is_the_slope_error() {
         let learned = Learned::of_field(Balls);
-        let mesh = SurfaceMesh {
-            vertices: vec![[0.4, 0.0, 0.0], [0.0, 0.0, -2.0]],
-            ..SurfaceMesh::default()
-        };
+        let mesh = Mesh::new(vec![[0.4, 0.0, 0.0], [0.0, 0.0, -2.0]], Vec::new());
         let (normals, off) = learned.normals(&mesh, 0.0);
         assert_eq!(normals, [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]);
         // Lengths 0.4 and 2, in f32.

@@ -4,6 +4,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal, Uniform};
 
 use super::mlp::{HostLayer, MlpConfig};
+use crate::linear::{Until, conjugate_gradient};
 
 /// Normal weights of standard deviation `sqrt(2 / inputs)` and zero biases (He et al. 2015), the
 /// output layer scaled by `output_scale`.
@@ -117,40 +118,25 @@ pub(crate) fn ridge(hidden: &[f64], missing: &[f64]) -> Vec<f64> {
     // bound.
     let trace: f64 = (0..columns).map(|i| matrix[i * columns + i]).sum();
     (0..columns).for_each(|i| matrix[i * columns + i] += RIDGE * trace / columns as f64);
-    conjugate_gradients(&matrix, &right, 4 * columns)
+    let apply = |x: &[f64], image: &mut [f64]| {
+        for (image, row) in image.iter_mut().zip(matrix.chunks(columns)) {
+            *image = row.iter().zip(x).map(|(a, x)| a * x).sum();
+        }
+    };
+    let until = Until {
+        steps: 4 * columns,
+        tolerance: RESIDUAL,
+    };
+    let mut change = vec![0.0; columns];
+    conjugate_gradient(apply, &right, None, &mut change, until);
+    change
 }
 
 /// The share of the mean diagonal that regularises [`ridge`]: below what f32 features resolve.
 const RIDGE: f64 = 1e-6;
 
-/// Solves `A x = b` for a symmetric positive definite `A`, row-major, in at most `most` steps.
-fn conjugate_gradients(a: &[f64], b: &[f64], most: usize) -> Vec<f64> {
-    let dot = |p: &[f64], q: &[f64]| p.iter().zip(q).map(|(p, q)| p * q).sum::<f64>();
-    let (mut x, mut residual, mut direction) = (vec![0.0; b.len()], b.to_vec(), b.to_vec());
-    let (start, mut squared) = (dot(b, b), dot(b, b));
-    for _ in 0..most {
-        if squared <= 1e-20 * start {
-            break;
-        }
-        let image: Vec<f64> = a.chunks(b.len()).map(|row| dot(row, &direction)).collect();
-        let step = squared / dot(&direction, &image);
-        x.iter_mut()
-            .zip(&direction)
-            .for_each(|(x, d)| *x += step * d);
-        residual
-            .iter_mut()
-            .zip(&image)
-            .for_each(|(r, i)| *r -= step * i);
-        let next = dot(&residual, &residual);
-        let turn = next / squared;
-        direction
-            .iter_mut()
-            .zip(&residual)
-            .for_each(|(d, r)| *d = r + turn * *d);
-        squared = next;
-    }
-    x
-}
+/// The share of the right-hand side that [`ridge`] leaves.
+const RESIDUAL: f64 = 1e-10;
 
 fn layer(inputs: usize, outputs: usize, weight: Vec<f32>) -> HostLayer {
     HostLayer {

@@ -4,16 +4,16 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use super::*;
-use crate::shape::testing::{sphere_cloud, tetrahedron};
+use crate::geometry::testing::{sphere_cloud, tetrahedron};
 
 /// The corner of a cube as OBJ, scaled and moved; `inwards` turns every triangle around.
 fn write_tetrahedron(path: &Path, scale: f64, inwards: bool, faces: usize) {
-    let (vertices, triangles) = tetrahedron(0.0);
+    let mesh = tetrahedron(0.0);
     let mut text = String::new();
-    for [x, y, z] in vertices {
+    for [x, y, z] in mesh.vertices {
         writeln!(text, "v {} {} {}", scale * x + 5e5, scale * y, scale * z).expect("grows");
     }
-    for [a, b, c] in &triangles[..faces] {
+    for [a, b, c] in &mesh.triangles[..faces] {
         let (b, c) = if inwards { (c, b) } else { (b, c) };
         writeln!(text, "f {} {} {}", a + 1, b + 1, c + 1).expect("grows");
     }

@@ -14,8 +14,8 @@
 
 use rayon::prelude::*;
 
-use super::super::mesh;
-use super::super::winding::{Charges, SummationTree};
+use crate::geometry::linear::dot;
+use crate::geometry::winding::{Charges, SummationTree};
 
 /// Steps of conjugate gradients. Fewer leave thin parts in doubt, many more fit the spacing of the
 /// points.
@@ -41,7 +41,7 @@ pub fn outward(
     let dipoles = problem.solve();
     let clear = |((dipole, normal), &area): ((&[f64; 3], &[f64; 3]), &f64)| {
         if area > 0.0 {
-            (mesh::dot(*dipole, *normal) / area).clamp(-1.0, 1.0)
+            (dot(*dipole, *normal) / area).clamp(-1.0, 1.0)
         } else {
             0.0
         }
@@ -59,12 +59,19 @@ struct Problem<'a> {
 }
 
 impl Problem<'_> {
-    /// Conjugate gradients on the normal equations (CGLS), from zero.
+    /// Conjugate gradients for least squares (CGLS; Björck, "Numerical Methods for Least Squares Problems",
+    /// 1996), from zero.
+    ///
+    /// Not `isomorph_model::linear::conjugate_gradient` on the normal equations: that takes the
+    /// curvature from the product of the direction with `W^T W` of it, and `W^T` is only close to the
+    /// adjoint of `W` here ([`SummationTree::pull`]). Here the curvature is a sum of squares, which
+    /// cannot be negative, and the residual is that of the equations themselves.
     fn solve(&self) -> Vec<[f64; 3]> {
         let mut dipoles = vec![[0.0; 3]; self.points.len()];
         let mut residual = vec![0.5; self.points.len()];
         let (mut gradient, mut slope) = self.gradient(&residual);
         let mut direction = gradient;
+        // A fixed number of steps and no tolerance: stopping early is the regularisation.
         for _ in 0..STEPS {
             let change = self.winding(&direction);
             let squares = change.iter().zip(self.areas).map(|(c, a)| c * c * a);
@@ -103,7 +110,7 @@ impl Problem<'_> {
         let scaled = pulls.iter().zip(self.areas);
         let scaled: Vec<[f64; 3]> = scaled.map(|(pull, area)| pull.map(|x| x * area)).collect();
         // Summed in order: the same on any number of cores.
-        let slope = pulls.iter().zip(&scaled).map(|(a, b)| mesh::dot(*a, *b));
+        let slope = pulls.iter().zip(&scaled).map(|(a, b)| dot(*a, *b));
         let slope = slope.sum();
         (scaled, slope)
     }
@@ -124,7 +131,7 @@ impl Problem<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shape::testing::sphere_cloud;
+    use crate::geometry::testing::sphere_cloud;
 
     #[test]
     fn each_point_of_a_sphere_knows_which_way_is_out() {

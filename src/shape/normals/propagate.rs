@@ -2,7 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::super::{Neighbour, mesh};
+use crate::geometry::Neighbour;
+use crate::geometry::linear::{difference, dot};
 
 /// How much two parts must lose by a link that makes them contradict each other, in points that
 /// surely know which way is out, for the link to be refused.
@@ -32,6 +33,7 @@ pub fn signs(
 ) -> Vec<f64> {
     let links = links(points, normals, neighbours);
     let mut parts = Parts::new(evidence);
+    // Surest first, as in Kruskal's spanning tree: a doubtful link decides only what no better one did.
     for link in &links {
         parts.join(link);
     }
@@ -43,12 +45,14 @@ fn links(points: &[[f64; 3]], normals: &[[f64; 3]], neighbours: &[Vec<Neighbour>
     let mut links: Vec<Link> = Vec::new();
     for (from, found) in neighbours.iter().enumerate() {
         for to in found.iter().map(|neighbour| neighbour.index as usize) {
+            // Every point is its own first neighbour. Links found from both ends do no harm: the second
+            // joins what is joined already.
             if to != from {
                 links.push(Link {
                     from: from as u32,
                     to: to as u32,
                     agreement: agreement(
-                        mesh::difference(points[to], points[from]),
+                        difference(points[to], points[from]),
                         normals[from],
                         normals[to],
                     ) as f32,
@@ -72,15 +76,13 @@ fn links(points: &[[f64; 3]], normals: &[[f64; 3]], neighbours: &[Vec<Neighbour>
 /// is the less sure the more squarely one looks at the other: then they lie on two sheets, or
 /// noise has moved them apart.
 fn agreement(apart: [f64; 3], a: [f64; 3], b: [f64; 3]) -> f64 {
-    let distance = mesh::dot(apart, apart).sqrt();
+    let distance = dot(apart, apart).sqrt();
+    // Two points at one place have no line between them to look along.
     if distance == 0.0 {
-        return mesh::dot(a, b);
+        return dot(a, b);
     }
-    let (x, y) = (
-        mesh::dot(apart, a) / distance,
-        mesh::dot(apart, b) / distance,
-    );
-    (mesh::dot(a, b) - 2.0 * x * y) * (1.0 - x.abs().max(y.abs()))
+    let (x, y) = (dot(apart, a) / distance, dot(apart, b) / distance);
+    (dot(a, b) - 2.0 * x * y) * (1.0 - x.abs().max(y.abs()))
 }
 
 /// Sets of points whose signs are tied to each other (union-find with parity), with what is known
@@ -130,13 +132,17 @@ impl Parts {
         if a == b {
             return;
         }
+        // The link is about two members; what is to be tied are their roots.
         let opposite = turned_a ^ turned_b ^ (link.agreement < 0.0);
         let sign = if opposite { -1.0 } else { 1.0 };
         let together = self.evidence[a] + sign * self.evidence[b];
         let lost = self.evidence[a].abs() + self.evidence[b].abs() - together.abs();
+        // Only two coherent parts can refuse a link: where the points of a part contradict each other
+        // the sum of their evidence is mostly noise.
         if lost > CONTRADICTION && self.coherence(a).min(self.coherence(b)) > COHERENCE {
             return;
         }
+        // The smaller below the larger keeps the paths to the roots short.
         let (large, small) = if self.size[a] < self.size[b] {
             (b, a)
         } else {
@@ -173,9 +179,13 @@ impl Parts {
             let agreement = NEIGHBOUR * f64::from(link.agreement) * sign_a * sign_b;
             (a != b).then_some((a, b, agreement))
         };
+        // A link within a part keeps its agreement when the part is turned as a whole, so that only
+        // links between two parts can decide.
         let refused: Vec<(usize, usize, f64)> = links.iter().filter_map(between).collect();
         let mut hold = vec![0.0; count];
         loop {
+            // Two passes: the first sets what a part holds by itself, the second adds each link to it. A part
+            // in several links is set to the same value each time.
             for &(a, b, _) in &refused {
                 hold[a] = signs[a] * self.evidence[a];
                 hold[b] = signs[b] * self.evidence[b];

@@ -1,0 +1,29 @@
+//! Files of shapes: what reads and what writes them.
+//!
+//! | file | what it does |
+//! |---|---|
+//! | `shape.rs` | [`Shape`], a mesh or a point cloud as its file gives it, and what every one must satisfy |
+//! | `read.rs` | a file of any of the formats in, [`Shape`] out |
+//! | `ply.rs`, `obj.rs`, `anime.rs` | one reader per format: bytes in, [`Shape`] (or [`Sequence`]) out |
+//! | `write.rs` | meshes as new PLY and OBJ files |
+//! | `carry.rs` | the input file again, its vertices moved |
+//! | `error.rs` | what can be wrong with a file |
+
+mod anime;
+mod carry;
+mod error;
+#[cfg(test)]
+pub(crate) mod malformed;
+mod obj;
+mod ply;
+mod read;
+mod shape;
+mod write;
+
+pub use anime::Sequence;
+pub use carry::{CarryError, rewrite_vertices};
+pub use error::{FEWEST_POINTS, ShapeError};
+pub use read::read;
+pub use shape::Shape;
+pub(crate) use shape::file_length;
+pub use write::{SurfaceFormat, WriteError, write_surface};

@@ -1,0 +1,36 @@
+//! Geometry that knows no file, no network and no method: points, meshes and what is measured on them.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | `linear.rs` | vectors and 3 x 3 matrices as arrays, the mean of points, eigenvectors |
+//! | `mesh.rs` | [`Mesh`], the only triangle mesh of the program: area, volume, normals, topology |
+//! | `edges.rs` | how the triangles of a mesh share their edges |
+//! | `connected.rs` | which vertices of a mesh are connected |
+//! | `components.rs` | the connected pieces of a mesh, without the small ones if desired |
+//! | `neighbours.rs` | k nearest neighbours |
+//! | `density.rs` | the spacing of points, and the area that they stand for |
+//! | `winding.rs` | winding numbers of points with normals |
+//!
+//! Conventions: triangles wind counter-clockwise seen from outside, so normals point outwards and the
+//! volume of a closed surface is positive. Vertices are `f64` in the user's coordinates and `f32` in
+//! normalised ones; measures are reckoned in `f64` in both cases.
+
+mod components;
+pub(crate) mod connected;
+pub(crate) mod density;
+mod edges;
+pub(crate) mod linear;
+mod mesh;
+mod neighbours;
+#[cfg(test)]
+pub(crate) mod testing;
+pub(crate) mod winding;
+
+pub use components::Component;
+pub use density::cloud_area;
+pub use edges::EdgeSharing;
+pub(crate) use edges::weld;
+pub use linear::Scalar;
+pub use mesh::{Mesh, vertex_normals};
+pub use isomorph_training::data::Bounds;
+pub use neighbours::{Neighbour, NeighbourSearch};
