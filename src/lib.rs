@@ -16,6 +16,7 @@ pub mod compare;
 pub mod evaluate;
 pub mod learner;
 pub mod matching;
+pub mod picture;
 pub mod recipe;
 pub mod report;
 pub mod run_directory;

@@ -1,4 +1,4 @@
-//! What people and programs see of a run: the events of the learner as text, numbers and pictures.
+//! What people and programs see of a run: the events of the learner as text and numbers.
 //!
 //! | file | what it holds |
 //! |---|---|
@@ -9,20 +9,15 @@
 //! | `pace.rs` | how long the remaining steps will take |
 //! | `log.rs` | `run.log`, with UTC times |
 //! | `metrics.rs` | `metrics.jsonl`: one object per logged step, written and read |
-//! | `picture.rs` | surfaces side by side in one PNG |
-//! | `camera.rs`, `raster.rs` | what a picture shows, and how it is drawn |
 //!
 //! Nothing here prints to standard output, which is for results.
 
 mod bar;
-mod camera;
 mod line;
 pub mod log;
 pub mod metrics;
 mod pace;
-pub mod picture;
 mod plain;
-mod raster;
 pub mod terminal;
 
 use std::io;
