@@ -11,6 +11,7 @@
 
 pub mod atomic;
 pub mod backend;
+pub mod charts;
 pub mod cli;
 pub mod compare;
 pub mod evaluate;

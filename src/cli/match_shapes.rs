@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::{Ending, Usage};
 use crate::atomic::write_atomically;
-use crate::compare::{ChartError, Line, Panel, line_chart};
+use crate::charts::{ChartError, Line, Panel, line_chart};
 use crate::matching::{MatchOptions, Matching, Rigid, match_shapes};
 use crate::shape;
 

@@ -11,22 +11,18 @@
 //! | `comparison.rs` | all results side by side, with their means: `comparison.json` |
 //! | `table.rs`, `columns.rs` | the same as Markdown: `table.md` |
 //! | `figure.rs` | error over time: `error.svg` |
-//! | `chart.rs`, `axis.rs`, `stroke.rs`, `legend.rs` | panels of lines as SVG, for this figure and others |
 //!
-//! Arrows run one way: `cli -> compare -> evaluate` (its result types only), `compare -> atomic`.
+//! Arrows run one way: `cli -> compare -> evaluate` (its result types only), `compare -> charts`,
+//! `compare -> atomic`.
 
-mod axis;
-mod chart;
 mod columns;
 mod comparison;
 mod digest;
 mod entry;
 mod figure;
-mod legend;
 mod plan;
 mod protocol;
 mod store;
-mod stroke;
 mod table;
 #[cfg(test)]
 mod testing;
@@ -34,8 +30,8 @@ mod testing;
 use std::io;
 
 use crate::atomic::write_atomically;
+use crate::charts::ChartError;
 
-pub use chart::{ChartError, Line, Panel, Scale, Stroke, line_chart};
 pub use comparison::{Absent, Comparison, MethodMean, MethodResult, PairComparison};
 pub use digest::{DigestError, Inputs};
 pub use entry::{Entry, Machine, Network, command_line, now};
