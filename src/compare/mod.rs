@@ -4,7 +4,6 @@
 //! | file | what it holds |
 //! |---|---|
 //! | `plan.rs` | which pairs and which methods: `--pairs`, `--methods`, `--variant` |
-//! | `protocol.rs` | the pairs of frames of the protocol, by the name of a sequence |
 //! | `entry.rs` | what is known of one method on one pair, and of the machine it ran on |
 //! | `digest.rs` | the fingerprint of all that decides a result |
 //! | `store.rs` | the folder of results: one file per pair and method, so that a comparison resumes |
@@ -21,7 +20,6 @@ mod digest;
 mod entry;
 mod figure;
 mod plan;
-mod protocol;
 mod store;
 mod table;
 #[cfg(test)]
@@ -37,7 +35,6 @@ pub use digest::{DigestError, Inputs};
 pub use entry::{Entry, Machine, Network, command_line, now};
 pub use figure::error_figure;
 pub use plan::{FramePair, MethodPlan, Plan, PlanError, Request, sequence_name};
-pub use protocol::protocol_pairs;
 pub use store::{Lookup, Store, StoreError, file_stem};
 pub use table::table;
 
