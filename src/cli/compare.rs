@@ -19,7 +19,7 @@ use super::paired::{self, Prepared};
 use super::{BackendArgs, Ending, QuietArgs, SetArgs, Usage, stop_on_interrupt, trained};
 use crate::backend;
 use crate::compare::{
-    self, Entry, FramePair, Inputs, Lookup, Machine, MethodPlan, Plan, Request, Store,
+    self, Entry, FramePair, Inputs, Lookup, Machine, MethodPlan, Plan, Request, Run, Store,
 };
 use crate::evaluate::{GroundTruth, Options, Reference, Span};
 use crate::recipe::{Preset, Recipe};
@@ -348,17 +348,19 @@ impl Bench {
         Entry {
             sequence: plan.sequence.clone(),
             pair,
-            method: method.label.clone(),
-            digest,
             recipe: made.recipe.to_toml(),
-            steps: made.recipe.training.steps,
-            batch: made.recipe.training.batch,
-            networks: made.networks,
-            training_seconds: made.training_seconds,
-            evaluation_seconds: made.evaluation_seconds,
-            machine: Machine::this(),
-            date: compare::now(),
-            command: compare::command_line(std::env::args()),
+            run: Run {
+                method: method.label.clone(),
+                digest,
+                steps: made.recipe.training.steps,
+                batch: made.recipe.training.batch,
+                networks: made.networks,
+                training_seconds: made.training_seconds,
+                evaluation_seconds: made.evaluation_seconds,
+                machine: Machine::this(),
+                date: compare::now(),
+                command: compare::command_line(std::env::args()),
+            },
             evaluation: made.evaluation,
         }
     }

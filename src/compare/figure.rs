@@ -58,11 +58,11 @@ fn panel(plan: &Plan, pair: FramePair, entries: &[Entry]) -> Option<Panel> {
 fn method_line(entry: &Entry) -> Line {
     let frames = &entry.evaluation.frames;
     if frames.iter().any(|frame| frame.surface.is_some()) {
-        line(entry, &entry.method, Stroke::Solid, |frame| {
+        line(entry, &entry.run.method, Stroke::Solid, |frame| {
             frame.surface.as_ref().map(|surface| &surface.metrics)
         })
     } else {
-        let label = format!("{} (carried mesh)", entry.method);
+        let label = format!("{} (carried mesh)", entry.run.method);
         line(entry, &label, Stroke::Solid, |frame| {
             frame.carried.as_ref().map(|carried| &carried.metrics)
         })

@@ -32,7 +32,7 @@ use crate::charts::ChartError;
 
 pub use comparison::{Absent, Comparison, MethodMean, MethodResult, PairComparison};
 pub use digest::{DigestError, Inputs};
-pub use entry::{Entry, Machine, Network, command_line, now};
+pub use entry::{Entry, Machine, Network, Run, command_line, now};
 pub use figure::error_figure;
 pub use plan::{FramePair, MethodPlan, Plan, PlanError, Request, sequence_name};
 pub use store::{Lookup, Store, StoreError, file_stem};
