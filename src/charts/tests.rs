@@ -131,11 +131,8 @@ fn a_line_is_broken_where_a_value_has_no_place_on_the_axis() {
     let svg = line_chart("Broken", &[panel]).expect("a chart");
     let document = roxmltree::Document::parse(&svg).expect("XML");
     let is_line = |node: &roxmltree::Node<'_, '_>| node.attribute("stroke-width") == Some("2");
-    let line = document
-        .descendants()
-        .filter(is_line)
-        .last()
-        .expect("a line");
+    let mut lines = document.descendants().filter(is_line);
+    let line = lines.next_back().expect("a line");
     let outline = line.attribute("d").expect("an outline");
     // The first two points, then the fourth alone.
     assert_eq!(
