@@ -1,9 +1,11 @@
 //! Draws one surface: triangles into a depth buffer, smoothly shaded, nine samples to a pixel.
 //!
-//! Diffuse light (Lambert) of a lamp to the upper left of the camera and ambient light fall on a point
+//! Light of a lamp to the upper left of the camera and ambient light fall on a point
 //! with the interpolated normal `n = (x, y, z)` (right, up, to the viewer):
 //!
-//! `light = colour (LAMP max(n . l, 0) + SKY (2 + y + z) / 4)`
+//! `light = colour (LAMP ((1 + n . l) / 2)² + SKY (2 + y + z) / 4)`
+//!
+//! The square ("half Lambert") fades out behind the surface's edge, so that the far side keeps its form.
 //!
 //! Light is added up linearly; pixels are encoded as sRGB.
 
@@ -13,9 +15,9 @@ use glam::{Vec3, Vec3Swizzles};
 const SAMPLES: usize = 3;
 /// The direction to the lamp in camera coordinates (right, up, to the viewer), not normalised.
 const LAMP_AT: Vec3 = Vec3::new(-0.45, 0.66, 0.60);
-const LAMP: f32 = 0.80;
+const LAMP: f32 = 0.85;
 /// Ambient light: more of it from above and from the viewer.
-const SKY: f32 = 0.50;
+const SKY: f32 = 0.30;
 /// Colours at times 0, 1/2 and 1 in linear light; a mixture of blue and orange alone would be grey.
 const COLOURS: [Vec3; 3] = [
     Vec3::new(0.13, 0.36, 0.70),
@@ -76,7 +78,8 @@ fn colour_at(time: f32) -> Vec3 {
 /// The share of its colour that a point with this normal sends to the viewer.
 fn brightness(normal: Vec3) -> f32 {
     let normal = normal.normalize_or_zero();
-    LAMP * normal.dot(LAMP_AT.normalize()).max(0.0) + SKY * (2.0 + normal.y + normal.z) / 4.0
+    let lamp = (1.0 + normal.dot(LAMP_AT.normalize())) / 2.0;
+    LAMP * lamp * lamp + SKY * (2.0 + normal.y + normal.z) / 4.0
 }
 
 /// Calls `visit` with the index of every sample whose centre the triangle covers, and with the
