@@ -8,7 +8,8 @@ use std::io;
 use isomorph_training::engine::NotHere;
 
 use crate::backend::BackendError;
-use crate::compare::{ChartError, DigestError, PlanError, ReportError, StoreError};
+use crate::charts::ChartError;
+use crate::compare::{DigestError, PlanError, ReportError, StoreError};
 use crate::cubes::GridError;
 use crate::evaluate::TruthError;
 use crate::formats::{ShapeError, WriteError};

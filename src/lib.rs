@@ -32,6 +32,7 @@ pub mod event;
 
 mod atomic;
 mod backend;
+mod charts;
 mod compare;
 mod cubes;
 mod error;
@@ -40,7 +41,7 @@ mod formats;
 mod geometry;
 mod matching;
 mod memory;
-mod report;
+mod picture;
 mod session;
 mod shape;
 mod surface;

@@ -21,7 +21,7 @@ pub(super) struct CompareArgs {
     #[arg(long, value_name = "SEQUENCE")]
     sequence: PathBuf,
 
-    /// Pairs of frames, as in 0-18,20-47 [default: those of the protocol, for its own sequences]
+    /// Pairs of frames, as in 0-18,20-47: the first and the last frame of each, counted from 0
     #[arg(long, value_name = "FROM-TO,...")]
     pairs: Option<String>,
 

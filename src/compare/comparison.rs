@@ -12,7 +12,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::entry::{Entry, Machine, Network};
+use super::entry::{Entry, Run};
 use super::plan::{FramePair, Plan};
 use super::store::file_name;
 use crate::evaluate::{Evaluation, FrameResult};
@@ -46,8 +46,9 @@ pub struct PairComparison {
 /// One method on one pair.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MethodResult {
-    /// Its label.
-    pub method: String,
+    /// How the method was run.
+    #[serde(flatten)]
+    pub run: Run,
     /// The means over the frames between the two.
     pub mean: FrameResult,
     /// How many frames that is.
@@ -55,24 +56,6 @@ pub struct MethodResult {
     /// At how many of them the method had no surface: at all of them if it never has one, at some if it
     /// vanished there, and then the mean has none either.
     pub without_surface: usize,
-    /// Training steps.
-    pub steps: usize,
-    /// Points per step.
-    pub batch: usize,
-    /// The networks that were trained.
-    pub networks: Vec<Network>,
-    /// Wall time of the training.
-    pub training_seconds: f64,
-    /// Wall time of the evaluation.
-    pub evaluation_seconds: f64,
-    /// Where it ran.
-    pub machine: Machine,
-    /// When it was done, RFC 3339 in UTC.
-    pub date: String,
-    /// How the program was called.
-    pub command: String,
-    /// The fingerprint of all that decides the result.
-    pub digest: String,
     /// The file beside this one that holds the recipe and the numbers of every frame.
     pub file: String,
 }
@@ -143,30 +126,21 @@ impl Comparison {
 pub(super) fn find<'a>(entries: &'a [Entry], pair: FramePair, label: &str) -> Option<&'a Entry> {
     entries
         .iter()
-        .find(|entry| entry.pair == pair && entry.method == label)
+        .find(|entry| entry.pair == pair && entry.run.method == label)
 }
 
 impl MethodResult {
     fn new(entry: &Entry) -> Self {
         let frames = &entry.evaluation.frames;
         Self {
-            method: entry.method.clone(),
+            run: entry.run.clone(),
             mean: entry.evaluation.mean.clone(),
             frames: frames.len(),
             without_surface: frames
                 .iter()
                 .filter(|frame| frame.surface.is_none())
                 .count(),
-            steps: entry.steps,
-            batch: entry.batch,
-            networks: entry.networks.clone(),
-            training_seconds: entry.training_seconds,
-            evaluation_seconds: entry.evaluation_seconds,
-            machine: entry.machine.clone(),
-            date: entry.date.clone(),
-            command: entry.command.clone(),
-            digest: entry.digest.clone(),
-            file: file_name(entry.pair, &entry.method),
+            file: file_name(entry.pair, &entry.run.method),
         }
     }
 }
@@ -175,7 +149,10 @@ impl MethodMean {
     /// The mean over all pairs, if the method is done on all and there are any.
     fn new(label: &str, pairs: &[PairComparison]) -> Option<Self> {
         let of = |pair: &PairComparison| {
-            let found = pair.methods.iter().find(|result| result.method == label);
+            let found = pair
+                .methods
+                .iter()
+                .find(|result| result.run.method == label);
             found.cloned()
         };
         let results: Vec<MethodResult> = pairs.iter().map(of).collect::<Option<_>>()?;
@@ -190,8 +167,8 @@ impl MethodMean {
             method: label.to_owned(),
             // Averaged over pairs as an evaluation averages over frames.
             mean: Evaluation::of(means).mean,
-            training_seconds: seconds(|result| result.training_seconds),
-            evaluation_seconds: seconds(|result| result.evaluation_seconds),
+            training_seconds: seconds(|result| result.run.training_seconds),
+            evaluation_seconds: seconds(|result| result.run.evaluation_seconds),
         })
     }
 }
@@ -229,6 +206,37 @@ mod tests {
     }
 
     #[test]
+    fn a_result_is_one_flat_object() {
+        let (plan, entries) = two_pairs_of_three_methods();
+        let result = &Comparison::new(&plan, &entries).pairs[0].methods[0];
+        let json = serde_json::to_value(result).expect("JSON");
+        let mut keys: Vec<&str> = json
+            .as_object()
+            .expect("an object")
+            .keys()
+            .map(String::as_str)
+            .collect();
+        keys.sort_unstable();
+        let expected = [
+            "batch",
+            "command",
+            "date",
+            "digest",
+            "evaluation_seconds",
+            "file",
+            "frames",
+            "machine",
+            "mean",
+            "method",
+            "networks",
+            "steps",
+            "training_seconds",
+            "without_surface",
+        ];
+        assert_eq!(keys, expected);
+    }
+
+    #[test]
     fn a_method_that_lacks_a_pair_has_no_mean_and_is_listed_as_missing() {
         let (plan, mut entries) = two_pairs_of_three_methods();
         let gone = entries.pop().expect("entries");
@@ -238,12 +246,12 @@ mod tests {
             comparison
                 .mean
                 .iter()
-                .all(|mean| mean.method != gone.method)
+                .all(|mean| mean.method != gone.run.method)
         );
         assert_eq!(comparison.mean.len(), 2);
         let missing = Absent {
             pair: gone.pair,
-            method: gone.method,
+            method: gone.run.method,
         };
         assert_eq!(comparison.missing, [missing]);
     }

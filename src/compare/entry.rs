@@ -17,12 +17,22 @@ pub struct Entry {
     /// The frames that the method saw.
     #[serde(flatten)]
     pub pair: FramePair,
+    /// How the method was run.
+    #[serde(flatten)]
+    pub run: Run,
+    /// The resolved recipe, TOML.
+    pub recipe: String,
+    /// What was measured.
+    pub evaluation: Evaluation,
+}
+
+/// How a method was run on a pair: what its file and the comparison both hold.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Run {
     /// The label of the method, see [`super::MethodPlan::label`].
     pub method: String,
     /// The fingerprint of all that decides the result, see [`super::Inputs::digest`].
     pub digest: String,
-    /// The resolved recipe, TOML.
-    pub recipe: String,
     /// Training steps.
     pub steps: usize,
     /// Points per step.
@@ -39,8 +49,6 @@ pub struct Entry {
     pub date: String,
     /// How the program was called, see [`command_line`].
     pub command: String,
-    /// What was measured.
-    pub evaluation: Evaluation,
 }
 
 /// A network and its size.

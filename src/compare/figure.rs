@@ -1,9 +1,9 @@
 //! Error over time: how far each method is from the truth at every frame between the two that it saw.
 
-use super::chart::{ChartError, Line, Panel, Scale, Stroke, line_chart};
 use super::comparison::find;
 use super::entry::Entry;
 use super::plan::{FramePair, Plan};
+use crate::charts::{ChartError, Line, Panel, Scale, Stroke, line_chart};
 use crate::evaluate::{FrameResult, Metrics};
 
 const Y_LABEL: &str = "CD ×10³ (normalised units²)";
@@ -58,11 +58,11 @@ fn panel(plan: &Plan, pair: FramePair, entries: &[Entry]) -> Option<Panel> {
 fn method_line(entry: &Entry) -> Line {
     let frames = &entry.evaluation.frames;
     if frames.iter().any(|frame| frame.surface.is_some()) {
-        line(entry, &entry.method, Stroke::Solid, |frame| {
+        line(entry, &entry.run.method, Stroke::Solid, |frame| {
             frame.surface.as_ref().map(|surface| &surface.metrics)
         })
     } else {
-        let label = format!("{} (carried mesh)", entry.method);
+        let label = format!("{} (carried mesh)", entry.run.method);
         line(entry, &label, Stroke::Solid, |frame| {
             frame.carried.as_ref().map(|carried| &carried.metrics)
         })
@@ -89,9 +89,9 @@ fn line(
 
 #[cfg(test)]
 mod tests {
-    use super::super::chart::testing::{legend, texts};
     use super::super::testing::two_pairs_of_three_methods;
     use super::*;
+    use crate::charts::tests::{legend, texts};
 
     #[test]
     fn there_is_a_panel_for_each_pair_and_each_method_is_in_the_legend_once() {

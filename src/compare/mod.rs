@@ -4,29 +4,23 @@
 //! | file | what it holds |
 //! |---|---|
 //! | `plan.rs` | which pairs and which methods: `--pairs`, `--methods`, `--variant` |
-//! | `protocol.rs` | the pairs of frames of the protocol, by the name of a sequence |
 //! | `entry.rs` | what is known of one method on one pair, and of the machine it ran on |
 //! | `digest.rs` | the fingerprint of all that decides a result |
 //! | `store.rs` | the folder of results: one file per pair and method, so that a comparison resumes |
 //! | `comparison.rs` | all results side by side, with their means: `comparison.json` |
 //! | `table.rs`, `columns.rs` | the same as Markdown: `table.md` |
 //! | `figure.rs` | error over time: `error.svg` |
-//! | `chart.rs`, `axis.rs`, `stroke.rs`, `legend.rs` | panels of lines as SVG, for this figure and others |
 //!
-//! Arrows run one way: `cli -> compare -> evaluate` (its result types only), `compare -> atomic`.
+//! Arrows run one way: `cli -> compare -> evaluate` (its result types only), `compare -> charts`,
+//! `compare -> atomic`.
 
-mod axis;
-mod chart;
 mod columns;
 mod comparison;
 mod digest;
 mod entry;
 mod figure;
-mod legend;
 mod plan;
-mod protocol;
 mod store;
-mod stroke;
 mod table;
 #[cfg(test)]
 mod testing;
@@ -34,14 +28,13 @@ mod testing;
 use std::io;
 
 use crate::atomic::write_atomically;
+use crate::charts::ChartError;
 
-pub use chart::{ChartError, Line, Panel, Scale, Stroke, line_chart};
 pub use comparison::{Absent, Comparison, MethodMean, MethodResult, PairComparison};
 pub use digest::{DigestError, Inputs};
-pub use entry::{Entry, Machine, Network, command_line, now};
+pub use entry::{Entry, Machine, Network, Run, command_line, now};
 pub use figure::error_figure;
 pub use plan::{FramePair, MethodPlan, Plan, PlanError, Request, sequence_name};
-pub use protocol::protocol_pairs;
 pub use store::{Lookup, Store, StoreError, file_stem};
 pub use table::table;
 

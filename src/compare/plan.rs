@@ -11,8 +11,6 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::protocol::{known_sequences, protocol_pairs};
-
 /// Rows that every table has; no method may be called so.
 const RESERVED: [&str; 2] = ["linear", "floor"];
 /// Longest label, in characters: it has to fit a table and a legend.
@@ -49,15 +47,17 @@ pub enum PlanError {
         /// Its frames.
         frames: usize,
     },
-    /// The sequence has no pairs of its own.
+    /// No pairs were given.
     #[error(
-        "--pairs is missing: {sequence} is not a sequence of the protocol ({}); say which frames, \
-         such as --pairs 0-10",
-        known_sequences()
+        "--pairs is missing: {sequence} has {frames} frames, 0 to {}; give the first and the last \
+         frame of each pair, such as --pairs 0-10,10-20",
+        frames.saturating_sub(1)
     )]
     NoPairs {
         /// The name of the sequence.
         sequence: String,
+        /// Its frames.
+        frames: usize,
     },
     /// A method that nobody knows.
     #[error("{given}: no such method \"{word}\"{hint} ({known})")]
@@ -146,7 +146,7 @@ pub struct Request<'a> {
     pub sequence: &'a str,
     /// How many frames it has.
     pub frames: usize,
-    /// The value of `--pairs`; the protocol's own pairs without it.
+    /// The value of `--pairs`, without which nothing can be compared.
     pub pairs: Option<&'a str>,
     /// The value of `--methods`.
     pub methods: Option<&'a str>,
@@ -187,14 +187,11 @@ pub fn sequence_name(path: &Path) -> String {
 }
 
 fn pairs(request: &Request<'_>) -> Result<Vec<FramePair>, PlanError> {
-    let pairs = match request.pairs {
-        Some(text) => text.split(',').map(pair).collect::<Result<Vec<_>, _>>()?,
-        None => protocol_pairs(request.sequence)
-            .ok_or_else(|| PlanError::NoPairs {
-                sequence: request.sequence.to_owned(),
-            })?
-            .to_vec(),
-    };
+    let text = request.pairs.ok_or_else(|| PlanError::NoPairs {
+        sequence: request.sequence.to_owned(),
+        frames: request.frames,
+    })?;
+    let pairs = text.split(',').map(pair).collect::<Result<Vec<_>, _>>()?;
     for (place, pair) in pairs.iter().enumerate() {
         if pair.to >= request.frames {
             return Err(PlanError::PastTheEnd {

@@ -4,6 +4,8 @@ use super::*;
 
 const KNOWN: &[&str] = &["quick", "default", "paper", "lipmlp", "nise", "eigenbasis"];
 
+const PAIR: Option<&str> = Some("0-18");
+
 fn request<'a>(
     pairs: Option<&'a str>,
     methods: Option<&'a str>,
@@ -36,28 +38,13 @@ fn pairs_are_read_in_the_order_given() {
 }
 
 #[test]
-fn a_sequence_of_the_protocol_has_pairs_of_its_own() {
-    let plan = Plan::new(&request(None, Some("quick"), &[])).expect("a plan");
+fn pairs_must_be_given() {
+    let refused = refusal(None, Some("quick"), &[]);
     assert_eq!(
-        plan.pairs,
-        protocol_pairs("fox_survey").expect("in the protocol")
+        refused,
+        "--pairs is missing: fox_survey has 55 frames, 0 to 54; give the first and the last frame of \
+         each pair, such as --pairs 0-10,10-20"
     );
-    let own = Request {
-        sequence: "my_cat",
-        ..request(None, Some("quick"), &[])
-    };
-    let refused = Plan::new(&own).expect_err("no pairs").to_string();
-    assert!(refused.contains("--pairs is missing: my_cat"), "{refused}");
-    assert!(refused.contains("bear_walk"), "{refused}");
-}
-
-#[test]
-fn the_protocols_pairs_all_have_something_between_them() {
-    for name in known_sequences().split(", ") {
-        for pair in protocol_pairs(name).expect(name) {
-            assert!(pair.to >= pair.from + 2, "{name} {pair}");
-        }
-    }
 }
 
 #[test]
@@ -85,7 +72,7 @@ fn what_is_no_pair_is_refused() {
 #[test]
 fn methods_come_before_variants_and_keep_their_order() {
     let variants = ["no divergence=quick,loss.divergence=0".to_owned()];
-    let plan = Plan::new(&request(None, Some("lipmlp,quick"), &variants)).expect("a plan");
+    let plan = Plan::new(&request(PAIR, Some("lipmlp,quick"), &variants)).expect("a plan");
     let labels: Vec<&str> = plan
         .methods
         .iter()
@@ -99,15 +86,15 @@ fn methods_come_before_variants_and_keep_their_order() {
 
 #[test]
 fn a_typing_error_is_answered_with_the_nearest_method() {
-    let refused = refusal(None, Some("quick,lipmpl"), &[]);
+    let refused = refusal(PAIR, Some("quick,lipmpl"), &[]);
     assert_eq!(
         refused,
         "--methods lipmpl: no such method \"lipmpl\"; did you mean lipmlp? \
          (quick, default, paper, lipmlp, nise, eigenbasis)"
     );
-    let refused = refusal(None, Some("zzz"), &[]);
+    let refused = refusal(PAIR, Some("zzz"), &[]);
     assert!(!refused.contains("did you mean"), "{refused}");
-    let refused = refusal(None, None, &["a=quikc"]);
+    let refused = refusal(PAIR, None, &["a=quikc"]);
     assert!(refused.contains("did you mean quick?"), "{refused}");
 }
 
@@ -116,7 +103,7 @@ fn commas_within_a_value_stay_in_it() {
     let given = [
         "x=quick,data.correspondences=a,b.csv,loss.spread=[0.1, 0.2],training.seed=3".to_owned(),
     ];
-    let plan = Plan::new(&request(None, None, &given)).expect("a plan");
+    let plan = Plan::new(&request(PAIR, None, &given)).expect("a plan");
     let expected = [
         "data.correspondences=a,b.csv",
         "loss.spread=[0.1, 0.2]",
@@ -127,7 +114,7 @@ fn commas_within_a_value_stay_in_it() {
 
 #[test]
 fn what_is_no_variant_is_refused() {
-    let refused = |given: &str| refusal(None, None, &[given]);
+    let refused = |given: &str| refusal(PAIR, None, &[given]);
     assert!(refused("quick").contains("has no \"=\""));
     assert!(refused("=quick").contains("0 characters, allowed are 1 to 48"));
     assert!(refused(&format!("{}=quick", "x".repeat(49))).contains("49 characters"));
@@ -138,15 +125,15 @@ fn what_is_no_variant_is_refused() {
 
 #[test]
 fn a_label_is_there_once_whatever_its_case() {
-    assert!(refusal(None, Some("quick,quick"), &[]).contains("given twice"));
-    assert!(refusal(None, Some("quick"), &["Quick=default"]).contains("given twice"));
-    assert!(refusal(None, Some("linear"), &[]).contains("is in every table"));
+    assert!(refusal(PAIR, Some("quick,quick"), &[]).contains("given twice"));
+    assert!(refusal(PAIR, Some("quick"), &["Quick=default"]).contains("given twice"));
+    assert!(refusal(PAIR, Some("linear"), &[]).contains("is in every table"));
 }
 
 #[test]
 fn nothing_to_compare_is_refused() {
     for methods in [None, Some(""), Some(" , ")] {
-        let refused = refusal(None, methods, &[]);
+        let refused = refusal(PAIR, methods, &[]);
         assert!(refused.starts_with("--methods is missing"), "{refused}");
     }
 }

@@ -141,7 +141,7 @@ impl Store {
     /// # Errors
     /// [`StoreError`]; an earlier result then stays as it was.
     pub fn record(&self, entry: &Entry) -> Result<(), StoreError> {
-        let path = self.folder.join(file_name(entry.pair, &entry.method));
+        let path = self.folder.join(file_name(entry.pair, &entry.run.method));
         let stored = Stored {
             format: FORMAT,
             isomorph: VERSION.to_owned(),
@@ -152,7 +152,7 @@ impl Store {
         if let Err(reason) = serde_json::from_str::<Stored<Entry>>(&text) {
             return Err(StoreError::NotFinite {
                 path,
-                method: entry.method.clone(),
+                method: entry.run.method.clone(),
                 pair: entry.pair,
                 reason,
             });
@@ -183,15 +183,18 @@ impl Store {
         }
         let stored: Stored<Entry> = serde_json::from_slice(text).map_err(damaged)?;
         let entry = stored.entry;
-        if (entry.sequence.as_str(), entry.pair, entry.method.as_str())
-            != (self.sequence.as_str(), pair, label)
+        if (
+            entry.sequence.as_str(),
+            entry.pair,
+            entry.run.method.as_str(),
+        ) != (self.sequence.as_str(), pair, label)
         {
             return Err(format!(
                 "holds {} on {} of {}",
-                entry.method, entry.pair, entry.sequence
+                entry.run.method, entry.pair, entry.sequence
             ));
         }
-        if entry.digest != digest {
+        if entry.run.digest != digest {
             return Err("made with another recipe, data or evaluation".to_owned());
         }
         Ok(entry)

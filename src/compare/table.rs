@@ -63,10 +63,13 @@ fn pairs_in_words(comparison: &Comparison) -> String {
 }
 
 fn pair_block(pair: &PairComparison) -> String {
-    let rows = pair
-        .methods
-        .iter()
-        .map(|result| Row::of_method(&result.method, &result.mean, result.training_seconds));
+    let rows = pair.methods.iter().map(|result| {
+        Row::of_method(
+            &result.run.method,
+            &result.mean,
+            result.run.training_seconds,
+        )
+    });
     // A pair is in the comparison only if a method is done on it.
     let reference = pair.methods.first().map(|result| result.mean.clone());
     block(rows.collect(), &reference.unwrap_or_default())
@@ -171,7 +174,7 @@ fn vanished(comparison: &Comparison) -> Option<String> {
             if (1..result.frames).contains(&result.without_surface) {
                 found.push(format!(
                     "{} on {} at {} of {} frames",
-                    escaped(&result.method),
+                    escaped(&result.run.method),
                     pair.pair,
                     result.without_surface,
                     result.frames
@@ -202,13 +205,19 @@ fn effort(comparison: &Comparison) -> String {
     for pair in &comparison.pairs {
         for result in &pair.methods {
             let given = [
-                escaped(&result.method),
-                result.steps.to_string(),
-                result.batch.to_string(),
-                networks(&result.networks),
+                escaped(&result.run.method),
+                result.run.steps.to_string(),
+                result.run.batch.to_string(),
+                networks(&result.run.networks),
             ];
             // A day is enough here; the second is in the JSON.
-            let day = result.date.split('T').next().unwrap_or_default().to_owned();
+            let day = result
+                .run
+                .date
+                .split('T')
+                .next()
+                .unwrap_or_default()
+                .to_owned();
             match rows.iter_mut().find(|row| row.given == given) {
                 Some(row) => {
                     row.pairs.push(pair.pair.to_string());
@@ -257,8 +266,8 @@ fn origin(comparison: &Comparison) -> String {
         let all: BTreeSet<String> = results().map(read).collect();
         all.into_iter().collect()
     };
-    let machines = distinct(&|result| escaped(&result.machine.to_string()));
-    let commands = distinct(&|result| result.command.clone());
+    let machines = distinct(&|result| escaped(&result.run.machine.to_string()));
+    let commands = distinct(&|result| result.run.command.clone());
     format!(
         "isomorph {} on {}. Made by\n\n```text\n{}\n```",
         comparison.isomorph,

@@ -179,7 +179,7 @@ fn a_method_has_one_row_of_effort_for_all_pairs_unless_it_differed() {
     let same = effort_rows(&entries);
     assert_eq!(same.len(), 1 + 3, "a head and three methods");
     assert_eq!(same[1][4], "0-18, 20-47");
-    entries[0].steps = 999;
+    entries[0].run.steps = 999;
     assert_eq!(effort_rows(&entries).len(), 1 + 4);
 }
 

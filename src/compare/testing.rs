@@ -1,6 +1,6 @@
 //! Made-up results for the tests of this module.
 
-use super::entry::{Entry, Machine, Network};
+use super::entry::{Entry, Machine, Network, Run};
 use super::plan::{FramePair, MethodPlan, Plan};
 use crate::evaluate::{Compared, Evaluation, FrameResult, Metrics};
 
@@ -59,9 +59,20 @@ pub(super) fn entry(
     Entry {
         sequence: "fox_survey".to_owned(),
         pair,
+        recipe: "preset = \"quick\"\n".to_owned(),
+        run: run(label),
+        evaluation: Evaluation {
+            frames: (1..count).map(frame).collect(),
+            mean: result(0.5, surface, carried),
+            ends: Vec::new(),
+        },
+    }
+}
+
+fn run(label: &str) -> Run {
+    Run {
         method: label.to_owned(),
         digest: "0123".to_owned(),
-        recipe: "preset = \"quick\"\n".to_owned(),
         steps: 1000,
         batch: 2200,
         networks: vec![Network {
@@ -76,11 +87,6 @@ pub(super) fn entry(
         },
         date: "2026-03-01T12:00:00Z".to_owned(),
         command: "isomorph compare --sequence fox_survey.anime".to_owned(),
-        evaluation: Evaluation {
-            frames: (1..count).map(frame).collect(),
-            mean: result(0.5, surface, carried),
-            ends: Vec::new(),
-        },
     }
 }
 

@@ -18,7 +18,8 @@ use super::prepare;
 use super::stop::StopFlag;
 use crate::backend::Backend;
 use crate::compare::{
-    self, Comparison, Entry, FramePair, Inputs, Lookup, Machine, MethodPlan, Plan, Request, Store,
+    self, Comparison, Entry, FramePair, Inputs, Lookup, Machine, MethodPlan, Plan, Request, Run,
+    Store,
 };
 use crate::error::{Error, Result};
 use crate::evaluate::{GroundTruth, Reference, Span};
@@ -312,17 +313,19 @@ impl Bench<'_> {
         Entry {
             sequence: plan.sequence.clone(),
             pair,
-            method: method.label.clone(),
-            digest,
             recipe: recipe.to_toml(),
-            steps: recipe.training.steps,
-            batch: recipe.training.batch,
-            networks: made.networks,
-            training_seconds: made.training_seconds,
-            evaluation_seconds: made.evaluation_seconds,
-            machine: Machine::this(),
-            date: compare::now(),
-            command: self.options.command.clone(),
+            run: Run {
+                method: method.label.clone(),
+                digest,
+                steps: recipe.training.steps,
+                batch: recipe.training.batch,
+                networks: made.networks,
+                training_seconds: made.training_seconds,
+                evaluation_seconds: made.evaluation_seconds,
+                machine: Machine::this(),
+                date: compare::now(),
+                command: self.options.command.clone(),
+            },
             evaluation: made.evaluation,
         }
     }

@@ -9,8 +9,8 @@ use super::trained::{Trained, check_time};
 use crate::error::{Error, Result};
 use crate::event::Event;
 use crate::formats::SurfaceFormat;
+use crate::picture;
 use crate::recipe::Recipe;
-use crate::report::picture;
 use crate::surface::frames::{Frame, FrameOptions, write_frames};
 
 /// What to write.

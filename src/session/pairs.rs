@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::atomic::write_atomically;
-use crate::compare::{ChartError, Line, Panel, line_chart};
+use crate::charts::{ChartError, Line, Panel, line_chart};
 use crate::error::{Error, Result};
 use crate::matching::{MatchOptions, Matching, match_shapes};
 use crate::formats::Shape;

@@ -84,7 +84,7 @@ fn pairs_are_frames_of_the_sequence_with_one_between() {
         ),
         (&["--pairs", "0-4,0-4"], &["--pairs 0-4", "twice"]),
         (&["--pairs", "first"], &["--pairs first", "FROM-TO"]),
-        (&[], &["--pairs is missing", "fox_survey"]),
+        (&[], &["--pairs is missing", "truth has 5 frames, 0 to 4"]),
     ];
     for (more, parts) in cases {
         let command = [&with(SMALL, &["--methods", "mlp"]), more].concat();
