@@ -134,7 +134,7 @@ def pair_of(sequence: Sequence, pair: tuple[int, int], every: int) -> dict:
 
 
 def preset_of(protocol: Path) -> tuple[str, dict]:
-    """The name of the preset, and what there is of it by sequence and pair; means over the seeds."""
+    """The preset's name, and its means over the seeds by sequence and pair."""
     content = compact.read(protocol)
     try:
         means: dict[tuple, list[dict]] = {}

@@ -6,8 +6,8 @@
 
 FOLDER is what `isomorph compare -o FOLDER` wrote: a folder for each sequence with a file for each
 pair and method. Written to DIR: data.json and table.md. data.json has no paths of this machine and
-six digits of each number; isomorph_paper/compact.py describes it. With --table nothing but data.json
-is read, and table.md is written again.
+six digits of each number; isomorph_paper/compact.py describes it. With --table only data.json is
+read, and table.md is written again.
 
 `paper.py` and `protocol.py` do this themselves. This is for comparisons that are made by hand.
 

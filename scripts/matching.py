@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """How well `isomorph match` finds correspondences, against the true ones of the sequences.
 
-    python3 scripts/matching.py [--binary PATH] [--out DIR] [--sequences DIR] [--seed S] [--only TEXT]
-                                [--table]
+    python3 scripts/matching.py [--binary PATH] [--out DIR] [--sequences DIR] [--seed S]
+                                [--only TEXT] [--table]
 
 Each pair of frames is matched as two meshes, the target's vertices in a random order, and as two
 clouds of 20,000 points sampled independently of each other, with normals. The program is given the

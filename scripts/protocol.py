@@ -224,8 +224,8 @@ CAPTION = """\
 Means over the frames strictly between the two that were seen with 5 % of their correspondences; of
 the seeds mean (least to most). Normalised units, 100,000 samples. Lines: straight lines between all
 true vertices. Aligned: at the best times in order. Volume: over the true one; swell: the true one
-over that on a straight line between its ends, which no two frames tell. Pieces: the most of any
-frame of any seed."""
+over that on a straight line between its ends, which two frames do not determine. Pieces: the most
+of any frame of any seed."""
 
 
 def markdown(content: dict) -> str:

@@ -302,7 +302,8 @@ def markdown(content: dict) -> str:
         "# How a training step scales",
         "",
         "Joint step of `isomorph bench --size shipped --derivatives forward` on "
-        f"{wanted['backend']}, median of {wanted['repeats']}; where not varied: {base}. The 1000 correspondences are"
+        f"{wanted['backend']}, median of {wanted['repeats']}; where not varied: {base}."
+        " The 1000 correspondences are"
         " carried whatever the number of points. Efficiency: the rate of the step's matrix products"
         " over that of one large product on as many threads. Peak memory: of the whole process.",
         "",

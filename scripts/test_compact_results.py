@@ -217,7 +217,8 @@ class Kept(unittest.TestCase):
         self.assertGreater(len(found), 20)
         for path in found:
             with self.subTest(path.parent.name):
-                table = path.with_name("table.md" if path.name == compact.NAME else f"{path.stem}.md")
+                name = "table.md" if path.name == compact.NAME else f"{path.stem}.md"
+                table = path.with_name(name)
                 self.assertEqual(table.read_text("utf-8"), self.table_of(path))
 
     def test_results_stay_few_and_small(self):

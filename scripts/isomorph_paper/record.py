@@ -85,7 +85,8 @@ def machine() -> dict:
 def made_by(how: dict) -> str:
     """The last line of a table: the command, the day and the machine of a record."""
     on = how["machine"]
-    return f"Made by `{how['command']}` on {how['date'][:10]}, {on['processor']}, {on['cores']} cores."
+    machine = f"{on['processor']}, {on['cores']} cores"
+    return f"Made by `{how['command']}` on {how['date'][:10]}, {machine}."
 
 
 def processor() -> str:
