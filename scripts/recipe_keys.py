@@ -25,8 +25,8 @@ def declared() -> set[str]:
     for path in SOURCE.rglob("recipe/**/*.rs"):
         section = None
         for line in path.read_text("utf-8").splitlines():
-            opened = re.match(r" {4}(\w+): \w+Recipe \{", line)
-            key = re.match(r" {8}(\w+): [^=]+=", line)
+            opened = re.match(r"\s*(\w+): \w+Recipe \{", line)
+            key = re.match(r"\s+(\w+): [^=]+=(?!=)", line)
             if opened:
                 section = opened.group(1).replace("_", "-")
             elif section and key:
