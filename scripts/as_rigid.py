@@ -1,12 +1,14 @@
 #!/usr/bin/env python3
-"""What rigidity alone can know: as-rigid-as-possible interpolation of the true meshes.
+"""What rigidity alone gives: as-rigid-as-possible interpolation of the true meshes.
 
     python3 scripts/as_rigid.py [--every N] [--out DIR] [--sequences DIR] [--protocol FILE]
+                                [--table]
 
 On every pair of the protocol the two end meshes, all of whose vertices are known, are interpolated
 so that each triangle turns evenly and stretches as little as its ends allow (rigid.py), and held
 against the true frames between, beside the straight lines and what protocol.py has measured of a
-preset, which knows 5 % of the vertices. Written to DIR: table.md and data.json.
+preset, which is given 5 % of the vertices. Written to DIR: table.md and data.json. With --table the
+table is made again from data.json.
 
 CD: Chamfer squared; HD: Hausdorff; vertices: root mean square error; in normalised units (mean area
 of the ends 1), 100,000 samples of each surface, means over the frames. Aligned: at the best of 129
@@ -23,7 +25,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
-from isomorph_paper import PaperError, command_line, degrade, experiments, record
+from isomorph_paper import PaperError, command_line, compact, degrade, experiments, record
 from isomorph_paper.command_line import ROOT
 from isomorph_paper.report import mean_of
 from isomorph_paper.rigid import AsRigid
@@ -41,8 +43,9 @@ SHOWN = {
 TITLES = {"lines": "straight lines", "as_rigid": "as rigid as possible", "preset": "`{}`"}
 NOTE = """\
 Each cell: Chamfer squared x 10^3 / Hausdorff / error of the vertices x 10^2 / the same at the best
-times. Straight lines and "as rigid as possible" know where every vertex ends, the preset 1000 of
-them."""
+times. Straight lines and "as rigid as possible" are given where every vertex ends, the preset 1000
+of them."""
+ABOUT = "What rigidity alone gives: the true meshes, interpolated as rigidly as possible."
 
 
 def arguments(words: list[str]) -> argparse.Namespace:
@@ -51,6 +54,7 @@ def arguments(words: list[str]) -> argparse.Namespace:
     add("--every", type=int, default=4, help="every so many frames are measured")
     add("--out", type=Path, default=ROOT / "scripts/results/as-rigid", help="where results go")
     command_line.add_sequences(parser)
+    command_line.add_table(parser)
     add(
         "--protocol",
         type=Path,
@@ -130,17 +134,15 @@ def pair_of(sequence: Sequence, pair: tuple[int, int], every: int) -> dict:
 
 
 def preset_of(protocol: Path) -> tuple[str, dict]:
-    """The name of the preset, and what there is of it by sequence and pair; means over the seeds."""
+    """The preset's name, and its means over the seeds by sequence and pair."""
+    content = compact.read(protocol)
     try:
-        content = json.loads(protocol.read_text("utf-8"))
-        means = {
-            (pair["sequence"], pair["from"], pair["to"]): [seed["mean"] for seed in pair["seeds"]]
-            for pair in content["pairs"]
-        }
+        means: dict[tuple, list[dict]] = {}
+        for each in compact.unpack(content):
+            key = (each["sequence"], each["from"], each["to"])
+            means.setdefault(key, []).append(each["evaluation"]["mean"])
         return content["method"], {pair: preset_means(each) for pair, each in means.items()}
-    except OSError as reason:
-        raise PaperError(f"{protocol}: cannot be read ({reason.strerror})") from reason
-    except (ValueError, KeyError, TypeError) as reason:
+    except (KeyError, TypeError) as reason:
         raise PaperError(f"{protocol}: not what protocol.py writes ({reason!r})") from reason
 
 
@@ -161,39 +163,45 @@ def cell(found: dict | None) -> str:
     return " / ".join(shown)
 
 
-def markdown(rows: list[dict], preset: str, how: str) -> str:
-    titles = ["frames", *(title.format(preset) for title in TITLES.values())]
+def markdown(content: dict) -> str:
+    """The table of data.json."""
+    titles = ["frames", *(title.format(content["preset"]) for title in TITLES.values())]
     lines = [f"| {' | '.join(titles)} |", "| --- |" + " ---: |" * len(TITLES)]
-    for row in rows:
+    for row in content["rows"]:
         name = f"{row['sequence']} {row['from']}-{row['to']}"
         lines.append(f"| {' | '.join([name, *(cell(row[key]) for key in TITLES)])} |")
-    about = "What rigidity alone can know: the true meshes, interpolated as rigidly as possible."
-    return "\n".join(["# as rigid as possible", "", about, "", *lines, "", NOTE, "", how, ""])
+    how = record.made_by(content)
+    return "\n".join(["# as rigid as possible", "", ABOUT, "", *lines, "", NOTE, "", how, ""])
 
 
-def run(options: argparse.Namespace, words: list[str]) -> None:
-    preset, measured = preset_of(options.protocol)
+def measured(options: argparse.Namespace, words: list[str]) -> dict:
+    """All pairs of the protocol, and how they were measured."""
+    preset, means = preset_of(options.protocol)
     rows, sequences = [], {}
     for subject in experiments.PROTOCOL:
-        sequence = read_sequence(options.sequences / f"{subject.sequence}.anime")
+        path = command_line.sequences(options) / f"{subject.sequence}.anime"
+        sequence = read_sequence(path)
         sequences[sequence.name] = f"sha256 {digest(sequence.path)}"
         for pair in subject.pairs:
             row = pair_of(sequence, pair, options.every)
-            rows.append(row | {"preset": measured.get((sequence.name, *pair))})
+            rows.append(row | {"preset": means.get((sequence.name, *pair))})
             print(json.dumps(rows[-1]), file=sys.stderr, flush=True)
-    command = shlex.join(["python3", "scripts/as_rigid.py", *words])
-    machine, date = record.machine(), record.now()
-    data = {
-        "command": command,
+    return {
+        "command": shlex.join(["python3", "scripts/as_rigid.py", *words]),
         "preset": preset,
         "rows": rows,
         "sequences": sequences,
-        "date": date,
-        "machine": machine,
+        "date": record.now(),
+        "machine": record.machine(),
     }
-    text = markdown(rows, preset, record.made_by(command, date, machine))
+
+
+def run(options: argparse.Namespace, words: list[str]) -> None:
+    numbers = options.out / compact.NAME
+    if not options.table:
+        compact.write(numbers, measured(options, words))
+    text = markdown(compact.read(numbers))
     write_atomically(options.out / "table.md", text.encode())
-    write_atomically(options.out / "data.json", (json.dumps(data, indent=1) + "\n").encode())
     print(text)
 
 

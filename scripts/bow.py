@@ -3,8 +3,8 @@
 
     python3 scripts/bow.py SEQUENCE.anime FROM TO RUN [--binary PATH] [--known N]
 
-Two frames say nothing of how fast each vertex goes in between, and a motion that bends limbs as little as
-possible may bow to the other side than the true one does: a paw that is lifted on its way bows up, a leg
+Two frames do not determine how fast each vertex goes in between. A motion that bends limbs as little as
+possible may bow to the other side than the true one: a paw that is lifted on its way bows up, and a leg
 that swings without bending at the knee bows down. This prints, for each frame between, in normalised units
 (mean area of the ends 1), root mean squares over the vertices:
 
@@ -13,11 +13,11 @@ that swings without bending at the knee bows down. This prints, for each frame b
     ours    both of the run, from the truth
     cosine  between the run's bow and the true one, over the vertices that move by more than .08;
             1: to the same side, -1: to the other
-    whole   both parts together: of the line, of the run, and of the run without what it misses of the
-            target, share by share of the time: what is lost on the way and not by where it arrives
+    whole   both parts together: of the line, of the run, and of the run without its error at the target,
+            which is taken out in proportion to the time: what is lost on the way and not at arrival
 
-The last line is what can be known of where vertices arrive: a smooth function through N of them, chosen at
-random (biharmonic splines; 1000 as `compare` gives), and by how much it misses all of them.
+The last line is how well N given vertices determine where all others arrive: the error of a smooth function
+through N of them, chosen at random (biharmonic splines; 1000 as `compare` gives).
 
 RUN is a run on that pair whose source has the sequence's vertices, such as those that `isomorph compare`
 leaves in runs/compare/NAME/FROM-TO/METHOD. Needs numpy.

@@ -1,11 +1,13 @@
 #!/usr/bin/env python3
 """How well `isomorph match` finds correspondences, against the true ones of the sequences.
 
-    python3 scripts/matching.py [--binary PATH] [--out DIR] [--sequences DIR] [--seed S] [--only TEXT]
+    python3 scripts/matching.py [--binary PATH] [--out DIR] [--sequences DIR] [--seed S]
+                                [--only TEXT] [--table]
 
 Each pair of frames is matched as two meshes, the target's vertices in a random order, and as two
-clouds of 20,000 points sampled independently of each other, with normals. The program sees the two
-files and nothing else. Written to DIR: table.md and data.json.
+clouds of 20,000 points sampled independently of each other, with normals. The program is given the
+two files and nothing else. Written to DIR: table.md and data.json. With --table the table is made
+again from data.json.
 
 Error: the distance between where a matched source vertex truly goes and the target vertex that it
 is matched with, in normalised units (mean area of the two shapes 1). Needs numpy. Exit status: 0
@@ -22,7 +24,7 @@ from pathlib import Path
 
 import numpy as np
 
-from isomorph_paper import PaperError, command_line, degrade, experiments, record
+from isomorph_paper import PaperError, command_line, compact, degrade, experiments, record
 from isomorph_paper.command_line import ROOT
 from isomorph_paper.sequences import (
     Sequence,
@@ -72,6 +74,7 @@ def arguments(words: list[str]) -> argparse.Namespace:
     command_line.add_binary(parser)
     add("--out", type=Path, default=ROOT / "scripts/results/matching", help="where results go")
     command_line.add_sequences(parser)
+    command_line.add_table(parser)
     add("--seed", type=int, default=0, help="of the inputs and of the matching")
     add("--only", default="", help="the rows whose name holds this text")
     options = parser.parse_args(words)
@@ -151,52 +154,55 @@ def measure(sequence: Sequence, ends: tuple[int, int], make, options) -> dict:
     }
 
 
-def markdown(rows: list[dict], how: str) -> str:
+def markdown(content: dict) -> str:
+    """The table of data.json."""
     titles = ["frames", "as", *(title for _, title, _ in COLUMNS)]
     lines = [f"| {' | '.join(titles)} |", "| --- | --- |" + " ---: |" * len(COLUMNS)]
-    for row in rows:
+    for row in content["rows"]:
         cells = [f"{row['sequence']} {row['from']}-{row['to']}", row["inputs"]]
         values = [(row["found"][key], form) for key, _, form in COLUMNS]
         cells += ["-" if value is None else form.format(value) for value, form in values]
         lines.append(f"| {' | '.join(cells)} |")
+    how = record.made_by(content)
     return "\n".join(["# matching", "", ABOUT, "", *lines, "", LEGEND, "", how, ""])
+
+
+def measured(options: argparse.Namespace, words: list[str]) -> dict:
+    """All rows that --only leaves, and how they were measured."""
+    rows, sequences = [], {}
+    for name, start, end in PAIRS:
+        sequence = read_sequence(command_line.sequences(options) / f"{name}.anime")
+        for inputs, make in (("meshes", meshes), ("clouds", clouds)):
+            if options.only not in f"{name} {start}-{end} {inputs}":
+                continue
+            sequences[name] = f"sha256 {digest(sequence.path)}"
+            found = measure(sequence, (start, end), make, options)
+            row = {"sequence": name, "from": start, "to": end, "inputs": inputs, "found": found}
+            rows.append(row)
+            print(json.dumps(row), file=sys.stderr, flush=True)
+    return {
+        "seed": options.seed,
+        "rows": rows,
+        "sequences": sequences,
+        **record.of(shlex.join(["scripts/matching.py", *words]), options.binary),
+    }
 
 
 def main(words: list[str]) -> int:
     options = arguments(words)
-    command = shlex.join(["scripts/matching.py", *words])
-    rows, sequences = [], {}
+    numbers = options.out / compact.NAME
     try:
-        for name, start, end in PAIRS:
-            sequence = read_sequence(options.sequences / f"{name}.anime")
-            for inputs, make in (("meshes", meshes), ("clouds", clouds)):
-                if options.only not in f"{name} {start}-{end} {inputs}":
-                    continue
-                sequences[name] = f"sha256 {digest(sequence.path)}"
-                found = measure(sequence, (start, end), make, options)
-                row = {"sequence": name, "from": start, "to": end, "inputs": inputs, "found": found}
-                rows.append(row)
-                print(json.dumps(row), file=sys.stderr, flush=True)
+        content = compact.read(numbers) if options.table else measured(options, words)
     except PaperError as error:
         print(f"matching.py: {error}", file=sys.stderr)
         return 1
-    if not rows:
+    if not content["rows"]:
         print(f"matching.py: --only {options.only}: no row has this text", file=sys.stderr)
         return 2
-    machine = record.machine()
-    date = record.now()
-    data = {
-        "command": command,
-        "seed": options.seed,
-        "rows": rows,
-        "sequences": sequences,
-        "date": date,
-        "machine": machine,
-        "versions": record.versions(options.binary),
-    }
-    text = markdown(rows, record.made_by(command, date, machine))
+    if not options.table:
+        compact.write(numbers, content)
+    text = markdown(compact.read(numbers))
     write_atomically(options.out / "table.md", text.encode())
-    write_atomically(options.out / "data.json", (json.dumps(data, indent=1) + "\n").encode())
     print(text)
     return 0
 

@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
 """Makes a table or figure of the paper on our sequences, by calling `isomorph compare`.
 
-    python3 scripts/paper.py NAME [--full] [--binary PATH] [--backend B] [--out DIR] [--dry-run]
+    python3 scripts/paper.py NAME [--full] [--binary PATH] [--backend B] [--out DIR] [--table]
 
-NAME is an experiment (`list` names them) or `all`. The results go to DIR/NAME: table.md,
-table.json, figure.svg, run.json (command lines, seed, machine, date, versions, statistics of the
-inputs), and below it what `compare` wrote; with --full, to DIR/NAME-full. An interrupted experiment
-goes on where it stopped when the same command is given again.
+NAME is an experiment (`list` names them) or `all`. The results go to DIR/NAME, with --full to
+DIR/NAME-full: table.md, figure.svg, and data.json with all numbers, command lines, seed, machine,
+date, versions and statistics of the inputs. What `compare` writes goes to --work. An interrupted
+experiment goes on where it stopped when the same command is given again. With --table nothing is
+trained: table and figure are made again from data.json.
 
 Without --full, a run is 1000 steps of 2200 points of the preset `quick`: 1 to 2 minutes on two
 cores. With it, 10,000 steps of 4000 points of the preset `paper`, as printed: hours.
@@ -18,12 +19,12 @@ import argparse
 import os
 import shlex
 import sys
-import time
 from pathlib import Path
 
 from isomorph_paper import (
     PaperError,
     command_line,
+    compact,
     experiments,
     figures,
     inputs,
@@ -44,6 +45,8 @@ def arguments(words: list[str]) -> argparse.Namespace:
     command_line.add_binary(parser)
     add("--backend", help="handed on to isomorph")
     add("--out", type=Path, default=ROOT / "scripts/results", help="where results go")
+    command_line.add_work(parser)
+    command_line.add_table(parser)
     add("--dry-run", action="store_true", help="print the commands, make nothing")
     command_line.add_sequences(parser)
     add(
@@ -102,6 +105,11 @@ def show_list() -> None:
 def run(experiment: experiments.Experiment, options: argparse.Namespace, words: list[str]) -> None:
     """One experiment from its inputs to its figure."""
     size = experiments.FULL if options.full else experiments.SMALL
+    name = f"{experiment.name}-full" if options.full else experiment.name
+    folder = options.out / name
+    if options.table:
+        leave(experiment, compact.read(folder / compact.NAME), folder)
+        return
     budget = runs.Budget(
         size,
         options.steps or size.steps,
@@ -109,8 +117,8 @@ def run(experiment: experiments.Experiment, options: argparse.Namespace, words: 
         options.seed,
         options.backend,
     )
-    folder = options.out / (f"{experiment.name}-full" if options.full else experiment.name)
-    paths = runs.Paths(options.sequences.resolve(), options.cache.resolve(), folder)
+    places = command_line.sequences(options).resolve(), options.cache.resolve()
+    paths = runs.Paths(*places, options.work.resolve() / name)
     plan = {
         subject: runs.planned(options.binary, experiment, subject, budget, paths)
         for subject in experiment.subjects
@@ -122,33 +130,38 @@ def run(experiment: experiments.Experiment, options: argparse.Namespace, words: 
         return
     figures.check()
     wanted = record.settings(experiment.name, budget)
-    record.begin(folder, wanted)
-    done, truths = carry_out(experiment, plan, budget, paths)
-    measured = runs.collect(experiment, size, folder)
-    if are_in_table(report.numbers(experiment, measured), folder):
-        # The date and the times on record are those of the runs, not of this look at them.
+    record.check(folder / compact.NAME, wanted)
+    record.begin(paths.results, wanted)
+    statistics, truths = carry_out(experiment, plan, budget, paths)
+    how = {
+        "experiment": experiment.name,
+        "about": experiment.about,
+        "settings": wanted,
+        **record.of(shlex.join(words), options.binary),
+        "sequences": sequence_digests(truths),
+        "inputs": statistics,
+    }
+    volumes = experiment.figure == "volume"
+    more = inputs.true_volumes(experiment.subjects, truths) if volumes else {}
+    content = compact.pack(runs.collect(experiment, size, paths.results), how, more)
+    if is_there(content, folder):
+        # The date on record is that of the runs, not of this look at them.
         print(f"{folder}: all rows were there already; left as it was")
         return
-    how = {
-        "command": shlex.join(words),
-        "binary": options.binary,
-        "sequences": sequence_digests(truths),
-        **done,
-    }
-    leave(experiment, budget, measured, truths, folder, shlex.join(words))
-    record.write(folder, wanted, how)
+    compact.write(folder / compact.NAME, content)
+    leave(experiment, content, folder)
 
 
-def are_in_table(numbers: str, folder: Path) -> bool:
-    """Whether the tables that are there are of these numbers."""
-    table = folder / "table.json"
-    there = (folder / "table.md").exists() and table.exists()
-    return there and table.read_text() == numbers
+def is_there(content: dict, folder: Path) -> bool:
+    """Whether the table that is there is of these numbers."""
+    path = folder / compact.NAME
+    there = path.exists() and (folder / "table.md").exists()
+    return there and compact.read(path).get("pairs") == content["pairs"]
 
 
 def carry_out(experiment, plan, budget, paths) -> tuple[dict, dict]:
-    """Makes the inputs and runs the commands; what was done, and the sequences."""
-    calls, statistics, truths = [], {}, {}
+    """Makes the inputs and runs the commands; statistics of the inputs, and the sequences."""
+    statistics, truths = {}, {}
     for subject, commands in plan.items():
         sequence = inputs.sequence_of(subject, paths.sequences, paths.cache)
         truths[subject.sequence] = sequence
@@ -157,29 +170,22 @@ def carry_out(experiment, plan, budget, paths) -> tuple[dict, dict]:
         for files in made.values():
             statistics[files.folder.name] = files.statistics
         for command in commands:
-            started = time.monotonic()
             runs.call_binary(command)
-            calls.append(
-                {"command": shlex.join(command), "seconds": round(time.monotonic() - started, 1)}
-            )
-    return {"calls": calls, "inputs": statistics}, truths
+    return statistics, truths
 
 
 def sequence_digests(truths: dict) -> dict:
     return {name: f"sha256 {digest(sequence.path)}" for name, sequence in truths.items()}
 
 
-def leave(experiment, budget, measured, truths, folder: Path, command: str) -> None:
-    """Writes the tables and the figure."""
-    how = record.made_by(command, record.now(), record.machine())
-    texts = {
-        "table.md": report.markdown(experiment, budget, measured, how),
-        "table.json": report.numbers(experiment, measured),
-    }
-    for name, text in texts.items():
-        write_atomically(folder / name, text.encode())
-    write_atomically(folder / "figure.svg", figures.draw(experiment, measured, truths))
-    print(f"{folder / 'table.md'}\n\n{texts['table.md']}")
+def leave(experiment: experiments.Experiment, content: dict, folder: Path) -> None:
+    """Writes the table and the figure of a compact form, and nothing that is not in it."""
+    figures.check()
+    measured = runs.measured(list(experiment.rows), compact.unpack(content))
+    text = report.markdown(experiment.name, content, measured)
+    write_atomically(folder / "table.md", text.encode())
+    write_atomically(folder / "figure.svg", figures.draw(experiment, measured, content))
+    print(f"{folder / 'table.md'}\n\n{text}")
 
 
 if __name__ == "__main__":

@@ -3,23 +3,23 @@
 
     python3 scripts/protocol.py [--method NAME] [--seeds 0,1,2] [--every N] [--out DIR] [--table]
 
-Calls `isomorph compare` for every sequence, which leaves what it measured in DIR/SEQUENCE and does
-not repeat what is done: an interrupted command goes on where it stopped. From all that is there it
-writes DIR/NAME.md, a table of means and ranges over the seeds with every goal that is missed, and
-DIR/NAME.json, the same unrounded. With --table nothing is trained.
+Calls `isomorph compare` for every sequence, which leaves what it measured in --work and does not
+repeat what is done: an interrupted command goes on where it stopped. From all that is there it
+writes DIR/NAME.json, all numbers in compact form, and DIR/NAME.md, a table of means and ranges over
+the seeds with every goal that is missed. With --table nothing is trained: the table is made again
+from DIR/NAME.json.
 
 Needs numpy. Exit status: 0 done, whether or not goals are met; 1 failed; 2 usage; 130 interrupted.
 """
 
 import argparse
-import json
 import shlex
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from isomorph_paper import PaperError, command_line, experiments, record, runs
+from isomorph_paper import PaperError, command_line, compact, experiments, record, runs
 from isomorph_paper.command_line import ROOT
 from isomorph_paper.report import entry, mean_of
 from isomorph_paper.sequences import Sequence, read_sequence, write_atomically
@@ -93,7 +93,8 @@ def arguments(words: list[str]) -> argparse.Namespace:
     add("--every", type=int, default=4, help="every so many frames are measured")
     command_line.add_binary(parser)
     add("--out", type=Path, default=ROOT / "scripts/results/protocol", help="where results go")
-    add("--table", action="store_true", help="train nothing: the table of what is there")
+    command_line.add_work(parser)
+    command_line.add_table(parser)
     add("--dry-run", action="store_true", help="print the commands, make nothing")
     command_line.add_sequences(parser)
     options = parser.parse_args(words)
@@ -116,34 +117,57 @@ def label(method: str, seed: int) -> str:
 def command(subject: experiments.Subject, options: argparse.Namespace) -> list[str]:
     """The call that measures all seeds on all pairs of a sequence."""
     words = [options.binary, "compare"]
-    words += ["--sequence", str(options.sequences / f"{subject.sequence}.anime")]
+    sequences = command_line.sequences(options)
+    words += ["--sequence", str(sequences / f"{subject.sequence}.anime")]
     words += ["--pairs", ",".join(f"{first}-{last}" for first, last in subject.pairs)]
     for seed in options.seeds:
         keys = f",training.seed={seed}" if seed else ""
         words += ["--variant", f"{label(options.method, seed)}={options.method}{keys}"]
-    return [*words, "--every", str(options.every), "--quiet", "-o", str(options.out)]
+    return [*words, "--every", str(options.every), "--quiet", "-o", str(work(options))]
 
 
-def collected(options: argparse.Namespace) -> list[Measured]:
-    """What is there of the seeds on each pair, in the protocol's order; none of a pair is left out."""
-    found = []
+def work(options: argparse.Namespace) -> Path:
+    """Where `compare` leaves what it measured."""
+    return options.work / "protocol"
+
+
+def collected(options: argparse.Namespace, words: list[str]) -> dict:
+    """The compact form of what is there of the seeds on each pair, in the protocol's order."""
+    found, swells = [], {}
     for subject in experiments.PROTOCOL:
-        folder = options.out / subject.sequence
+        folder = work(options) / subject.sequence
         entries = runs.read_entries(folder) if folder.is_dir() else {}
-        sequence = read_sequence(options.sequences / f"{subject.sequence}.anime")
+        path = command_line.sequences(options) / f"{subject.sequence}.anime"
+        sequence = read_sequence(path)
         for pair in subject.pairs:
-            labels = {seed: label(options.method, seed) for seed in options.seeds}
-            mine = {
-                seed: entries[(name, *pair)]
-                for seed, name in labels.items()
-                if (name, *pair) in entries
-            }
-            if mine:
-                frames = [f["frame"] for f in next(iter(mine.values()))["evaluation"]["frames"]]
-                found.append(Measured(subject.sequence, pair, mine, swell(sequence, pair, frames)))
+            names = [label(options.method, seed) for seed in options.seeds]
+            mine = [entries[(name, *pair)] for name in names if (name, *pair) in entries]
+            for each in mine[:1]:
+                frames = [frame["frame"] for frame in each["evaluation"]["frames"]]
+                swells[subject.sequence, *pair] = {"swell": swell(sequence, pair, frames)}
+            found += mine
     if not found:
-        raise PaperError(f"{options.out}: no result of {options.method!r}; run without --table")
-    return found
+        raise PaperError(f"{work(options)}: no result of {options.method!r}")
+    command = shlex.join(["python3", "scripts/protocol.py", *words])
+    how = {"method": options.method, **record.of(command, options.binary)}
+    return compact.pack(found, how, swells)
+
+
+def measurements(content: dict) -> list[Measured]:
+    """The pairs of a compact form."""
+    key_of = lambda each: (each["sequence"], each["from"], each["to"])
+    pairs: dict[tuple, dict[int, dict]] = {}
+    for each in compact.unpack(content):
+        pairs.setdefault(key_of(each), {})[seed_of(each["method"])] = each
+    return [
+        Measured(each["sequence"], (each["from"], each["to"]), pairs[key_of(each)], each["swell"])
+        for each in content["pairs"]
+    ]
+
+
+def seed_of(row: str) -> int:
+    """The seed that `label` made a label of."""
+    return int(row.rpartition(": seed ")[2]) if ": seed " in row else 0
 
 
 def swell(sequence: Sequence, pair: tuple[int, int], frames: list[int]) -> float:
@@ -200,11 +224,13 @@ CAPTION = """\
 Means over the frames strictly between the two that were seen with 5 % of their correspondences; of
 the seeds mean (least to most). Normalised units, 100,000 samples. Lines: straight lines between all
 true vertices. Aligned: at the best times in order. Volume: over the true one; swell: the true one
-over that on a straight line between its ends, which no two frames tell. Pieces: the most of any
-frame of any seed."""
+over that on a straight line between its ends, which two frames do not determine. Pieces: the most
+of any frame of any seed."""
 
 
-def markdown(all_pairs: list[Measured], options: argparse.Namespace, words: list[str]) -> str:
+def markdown(content: dict) -> str:
+    """The table, its legend, the goals that are missed, and how all was made."""
+    all_pairs = measurements(content)
     heads = ["pair", "seeds"]
     for figure in FIGURES:
         heads += [figure.title, "lines"]
@@ -216,9 +242,9 @@ def markdown(all_pairs: list[Measured], options: argparse.Namespace, words: list
     missed = [f"* {name}: {'; '.join(texts)}." for name, texts in listed if texts]
     met = goals * len(all_pairs) - sum(len(texts) for _, texts in listed)
     dates = sorted(one["date"][:10] for each in all_pairs for one in each.entries.values())
-    machine = record.machine()
+    machine = content["machine"]
     parts = [
-        f"# `{options.method}` by the protocol",
+        f"# `{content['method']}` by the protocol",
         "\n".join(f"| {' | '.join(cells)} |" for cells in table),
         CAPTION,
         (
@@ -228,45 +254,26 @@ def markdown(all_pairs: list[Measured], options: argparse.Namespace, words: list
         ),
         "\n".join(missed),
         f"Measured {dates[0]} to {dates[-1]}, on {machine['processor']}, {machine['cores']} cores. "
-        f"Made by `{shlex.join(['python3', 'scripts/protocol.py', *words])}`.",
+        f"Made by `{content['command']}`.",
     ]
     return "\n\n".join(part for part in parts if part) + "\n"
 
 
-def numbers(all_pairs: list[Measured], options: argparse.Namespace) -> str:
-    pairs = [
-        {
-            "sequence": each.sequence,
-            "from": each.pair[0],
-            "to": each.pair[1],
-            "swell": each.swell,
-            "misses": misses(each),
-            "seeds": [
-                {
-                    "seed": seed,
-                    "training_seconds": one["training_seconds"],
-                    "mean": one["evaluation"]["mean"],
-                }
-                for seed, one in each.entries.items()
-            ],
-        }
-        for each in all_pairs
-    ]
-    content = {"method": options.method, "pairs": pairs}
-    return json.dumps(content, indent=1, allow_nan=False) + "\n"
-
-
 def run(options: argparse.Namespace, words: list[str]) -> None:
-    commands = [command(subject, options) for subject in experiments.PROTOCOL]
-    if options.dry_run:
-        print("\n".join(map(shlex.join, commands)))
-        return
-    for each in [] if options.table else commands:
-        runs.call_binary(each)
-    found = collected(options)
-    text = markdown(found, options, words)
+    numbers = options.out / f"{options.method}.json"
+    if options.table:
+        content = compact.read(numbers)
+    else:
+        commands = [command(subject, options) for subject in experiments.PROTOCOL]
+        if options.dry_run:
+            print("\n".join(map(shlex.join, commands)))
+            return
+        for each in commands:
+            runs.call_binary(each)
+        content = collected(options, words)
+        compact.write(numbers, content)
+    text = markdown(content)
     write_atomically(options.out / f"{options.method}.md", text.encode())
-    write_atomically(options.out / f"{options.method}.json", numbers(found, options).encode())
     print(f"{options.out / options.method}.md\n\n{text}")
 
 

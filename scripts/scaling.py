@@ -2,14 +2,15 @@
 """Measures how a training step scales, by calling `isomorph bench`.
 
     python3 scripts/scaling.py [--backend B] [--binary PATH] [--repeats N] [--threads 1,2]
-                               [--sweep NAME]... [--out DIR] [--dry-run]
+                               [--sweep NAME]... [--out DIR] [--table] [--dry-run]
 
 From the size `shipped` with forward derivatives, one thing is varied at a time: points, width,
 depth, and time steps of a trajectory, each on one thread and on two. The results go to DIR/scaling
-(DIR/scaling-B for a backend other than flex): table.md, table.json, figure.svg, run.json (command
-lines, machine, date, versions), and in measured/ what `bench` printed, a file for each point. What
-is measured is not measured again, by the same binary: an interrupted run goes on where it stopped
-when the same command is given again, and points on several sweeps are measured once.
+(DIR/scaling-B for a backend other than flex): table.md, figure.svg, and data.json with all numbers,
+command lines, machine, date and versions. What `bench` printed goes to --work, a file for each
+point. What is measured is not measured again, by the same binary: an interrupted run goes on where
+it stopped when the same command is given again, and points on several sweeps are measured once.
+With --table nothing is measured: table and figure are made again from data.json.
 
 The machine should do nothing else: table.md says how busy other programs kept it (Linux only). All
 points take about half an hour on two cores.
@@ -18,7 +19,6 @@ Needs numpy and matplotlib. Exit status: 0 done, 1 failed, 2 usage, 130 interrup
 """
 
 import argparse
-import io
 import json
 import os
 import resource
@@ -30,7 +30,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from isomorph_paper import PaperError, command_line, figures, record
+from isomorph_paper import PaperError, command_line, compact, figures, record
 from isomorph_paper.command_line import ROOT
 from isomorph_paper.sequences import digest, write_atomically
 
@@ -97,6 +97,8 @@ def arguments(words: list[str]) -> argparse.Namespace:
     add("--threads", default="1,2", help="numbers of threads (default: 1,2)")
     add("--sweep", action="append", choices=SWEEPS, help="only this one; may be repeated")
     add("--out", type=Path, default=ROOT / "scripts/results", help="where results go")
+    command_line.add_work(parser)
+    command_line.add_table(parser)
     add("--dry-run", action="store_true", help="print the commands, measure nothing")
     options = parser.parse_args(words)
     if not 1 <= options.repeats <= 1000:
@@ -138,28 +140,37 @@ def run(points: list[Point], options: argparse.Namespace, command: str) -> None:
     figures.check()
     name = "scaling" if options.backend == "flex" else f"scaling-{options.backend}"
     folder = options.out / name
-    wanted = settings(options)
-    record.begin(folder, wanted)
-    measured = {}
+    if not options.table:
+        compact.write(folder / compact.NAME, measured(points, options, command, name))
+    content = compact.read(folder / compact.NAME)
+    text = markdown(content)
+    write_atomically(folder / "table.md", text.encode())
+    write_atomically(folder / "figure.svg", draw(content["rows"]))
+    print(f"{folder / 'table.md'}\n\n{text}")
+
+
+def measured(points: list[Point], options: argparse.Namespace, command: str, name: str) -> dict:
+    """All points, measured now or before, and how."""
+    wanted, work = settings(options), options.work / name
+    record.check(options.out / name / compact.NAME, wanted)
+    record.begin(work, wanted)
+    entries = {}
     for point in points:
-        path = folder / "measured" / point.file
+        path = work / point.file
         if not path.exists():
             entry = measure(point, options)
             write_atomically(path, (json.dumps(entry, indent=1) + "\n").encode())
-        measured[point] = read(path)
-    rows = [row(point, entry) for point, entry in measured.items()]
-    how = record.made_by(command, record.now(), record.machine())
-    text = markdown(rows, options, how)
-    write_atomically(folder / "table.md", text.encode())
-    write_atomically(folder / "table.json", (json.dumps(rows, indent=1) + "\n").encode())
-    write_atomically(folder / "figure.svg", draw(rows))
+        entries[point] = read(path)
     calls = [
         {key: entry[key] for key in ("command", "threads", "date", "seconds", "others")}
-        for entry in {point.file: entry for point, entry in measured.items()}.values()
+        for entry in {point.file: entry for point, entry in entries.items()}.values()
     ]
-    more = {"command": command, "binary": options.binary, "calls": calls}
-    record.write(folder, wanted, more)
-    print(f"{folder / 'table.md'}\n\n{text}")
+    return {
+        "settings": wanted,
+        **record.of(command, options.binary),
+        "rows": [row(point, entry) for point, entry in entries.items()],
+        "calls": calls,
+    }
 
 
 def settings(options: argparse.Namespace) -> dict:
@@ -248,7 +259,7 @@ def children_seconds() -> float:
 
 
 def read(path: Path) -> dict:
-    """A file of measured/."""
+    """What was measured at a point before."""
     try:
         return json.loads(path.read_text("utf-8"))
     except ValueError as reason:
@@ -256,7 +267,7 @@ def read(path: Path) -> dict:
 
 
 def row(point: Point, entry: dict) -> dict:
-    """A point's line of table.json."""
+    """A point's row of data.json."""
     bench = entry["bench"]
     return {
         "sweep": point.sweep,
@@ -282,29 +293,32 @@ COLUMNS = (
 )
 
 
-def markdown(rows: list[dict], options: argparse.Namespace, how: str) -> str:
+def markdown(content: dict) -> str:
     """The table for people: a section for each sweep."""
+    rows, wanted = content["rows"], content["settings"]
+    counts = sorted({row["threads"] for row in rows})
     base = ", ".join(f"{name} {value}" for name, value in BASE.items())
     lines = [
         "# How a training step scales",
         "",
-        f"Joint step of `isomorph bench --size shipped --derivatives forward` on {options.backend},"
-        f" median of {options.repeats}; where not varied: {base}. The 1000 correspondences are"
+        "Joint step of `isomorph bench --size shipped --derivatives forward` on "
+        f"{wanted['backend']}, median of {wanted['repeats']}; where not varied: {base}."
+        " The 1000 correspondences are"
         " carried whatever the number of points. Efficiency: the rate of the step's matrix products"
         " over that of one large product on as many threads. Peak memory: of the whole process.",
         "",
-        how,
+        record.made_by(content),
         others_line(rows),
     ]
-    for sweep in options.sweep:
-        titles = [f"{title}, {count} thr." for count in options.threads for title, *_ in COLUMNS]
+    for sweep in dict.fromkeys(row["sweep"] for row in rows):
+        titles = [f"{title}, {count} thr." for count in counts for title, *_ in COLUMNS]
         lines += ["", f"## {AXES[sweep]}", "", f"| {AXES[sweep]} | {' | '.join(titles)} |"]
         lines.append("|---" * (1 + len(titles)) + "|")
         for at in SWEEPS[sweep]:
             mine = {r["threads"]: r for r in rows if (r["sweep"], r["at"]) == (sweep, at)}
             cells = [
                 cell(number(mine[count]), digits)
-                for count in options.threads
+                for count in counts
                 for _, number, digits in COLUMNS
             ]
             lines.append(f"| {at} | {' | '.join(cells)} |")
@@ -355,10 +369,7 @@ def draw(rows: list[dict]) -> bytes:
     for panel, sweep in zip(axes[-1], sweeps, strict=True):
         panel.set_xlabel(AXES[sweep])
     figures.legend(figure, axes)
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
-    plot.close(figure)
-    return buffer.getvalue()
+    return figures.svg(figure)
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 
 import as_rigid
-from isomorph_paper import experiments
+from isomorph_paper import compact, experiments
 from isomorph_paper.rigid import AsRigid
 from isomorph_paper.sequences import area, write_sequence
 from test_bow import turned
@@ -124,9 +124,11 @@ class Command(unittest.TestCase):
             "surface": {"chamfer_squared": 0.5e-3, "hausdorff": 0.25},
             "carried": {"tracked_rmse": 0.03, "aligned": {"tracked_rmse": 0.02}},
         }
-        pair = {"sequence": "turning", "from": 0, "to": 8, "seeds": [{"mean": mean}]}
+        frames = {"frame": 4, "time": 0.5, **mean}
+        entry = {"sequence": "turning", "from": 0, "to": 8, "method": "default"}
+        entry["evaluation"] = {"frames": [frames], "mean": mean}
         self.protocol = self.folder / "default.json"
-        self.protocol.write_text(json.dumps({"method": "default", "pairs": [pair]}))
+        compact.write(self.protocol, compact.pack([entry], {"method": "default"}))
 
     def call(self, *words: str) -> tuple[int, str]:
         said = io.StringIO()
@@ -147,6 +149,9 @@ class Command(unittest.TestCase):
         self.assertAlmostEqual(row["lines"]["vertices"], away * (1 - np.cos(0.4)), places=6)
         table = (self.folder / "out/table.md").read_text()
         self.assertIn("| 0.500 / 0.250 / 3.00 / 2.00 |", table)
+        (self.folder / "out/table.md").unlink()
+        self.assertEqual(self.call("--table")[0], 0)
+        self.assertEqual((self.folder / "out/table.md").read_text(), table)
 
     def test_frames_that_leave_none_and_a_strange_file_are_told(self):
         status, said = self.call("--every", "8")

@@ -61,7 +61,7 @@ class Degradations(unittest.TestCase):
     def test_pairs_are_of_different_vertices_with_themselves(self):
         self.assertEqual(len(np.unique(self.pairs[:, 0])), 1000)
         np.testing.assert_array_equal(self.pairs[:, 0], self.pairs[:, 1])
-        with self.assertRaisesRegex(PaperError, "11 pairs asked of 10 vertices"):
+        with self.assertRaisesRegex(PaperError, "11 pairs wanted, 10 vertices there"):
             degrade.same_vertex_pairs(10, 11, self.rng)
 
     def test_exactly_the_share_is_swapped_and_nothing_else_changes(self):

@@ -75,8 +75,11 @@ class Matching(unittest.TestCase):
         keys = (key for key, _, _ in matching.COLUMNS)
         found = {key: 0.5 for key in keys} | {"pairs": 7, "right": None}
         row = {"sequence": "fox", "from": 0, "to": 9, "inputs": "clouds", "found": found}
-        text = matching.markdown([json.loads(json.dumps(row))], "Made by hand.")
+        machine = {"processor": "a processor", "cores": 2}
+        how = {"command": "a command", "date": "2001-01-01T00:00:00Z", "machine": machine}
+        text = matching.markdown({"rows": [json.loads(json.dumps(row))], **how})
         self.assertIn("| fox 0-9 | clouds | 7 | - | 0.5000 |", text)
+        self.assertIn("Made by `a command` on 2001-01-01, a processor, 2 cores.", text)
 
 
 if __name__ == "__main__":

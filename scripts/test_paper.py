@@ -9,6 +9,8 @@ import contextlib
 import io
 import json
 import os
+import shlex
+import shutil
 import sys
 import tempfile
 import unittest
@@ -22,10 +24,11 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 import fake_isomorph
 import paper
-from isomorph_paper import PaperError, experiments, inputs, runs, sequences
+import recipe_keys
+from isomorph_paper import PaperError, command_line, compact, experiments, inputs, runs, sequences
 from test_degrade import sphere
 
-EXPECTED_FILES = {"table.md", "table.json", "figure.svg", "run.json"}
+EXPECTED_FILES = {"table.md", "data.json", "figure.svg"}
 
 
 class Declarations(unittest.TestCase):
@@ -44,13 +47,19 @@ class Declarations(unittest.TestCase):
                     self.assertNotRegex(label, "[=,|]", experiment.name)
 
     def test_keys_are_those_of_the_recipe(self):
-        text = (paper.ROOT / "src/recipe/keys.rs").read_text()
+        known = recipe_keys.declared()
         for experiment in experiments.EXPERIMENTS:
             rows = [key for row in experiment.rows for key in row.keys]
-            for key in [*rows, *experiment.keys, *inputs.keys_of(Path("/folder"))]:
-                section, field = key.partition("=")[0].split(".")
-                self.assertRegex(text, rf"\b{section}: \w+Recipe")
-                self.assertRegex(text, rf"\n        {field.replace('-', '_')}: ", key)
+            for key in [*rows, *experiment.keys, *inputs.keys_of(Path("folder"))]:
+                self.assertIn(key.partition("=")[0], known)
+
+    def test_every_key_acts_in_the_geometry_of_its_row(self):
+        for experiment in experiments.EXPERIMENTS:
+            for size in (experiments.SMALL, experiments.FULL):
+                for row in experiment.rows_at(size):
+                    words = runs.variant(row, experiment, size, ()).partition("=")[2].split(",")
+                    idle = recipe_keys.idle(words[0], words[1:])
+                    self.assertEqual(idle, [], f"{experiment.name}: {row.label}")
 
     def test_sweeps_say_where_each_row_is_and_inputs_have_makers(self):
         for experiment in experiments.EXPERIMENTS:
@@ -93,6 +102,7 @@ class Experiments(unittest.TestCase):
         """The status, stdout and stderr of a command."""
         places = ["--sequences", self.folder / "in", "--cache", self.folder / "cache"]
         places += ["--out", self.folder / "out", "--binary", self.binary]
+        places += ["--work", self.folder / "work"]
         out, err = io.StringIO(), io.StringIO()
         with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
             status = paper.main([*words, *map(str, places)])
@@ -105,7 +115,7 @@ class Experiments(unittest.TestCase):
         status, out, err = self.paper("errors")
         self.assertEqual(status, 0, err)
         folder = self.folder / "out/errors"
-        self.assertEqual({path.name for path in folder.iterdir() if path.is_file()}, EXPECTED_FILES)
+        self.assertEqual({path.name for path in folder.iterdir()}, EXPECTED_FILES)
         text = (folder / "table.md").read_text()
         self.assertIn(text, out)
         self.assertIn("## fox_survey, frames 0-18, 20-47", text)
@@ -113,14 +123,16 @@ class Experiments(unittest.TestCase):
         self.assertIn("nfgp (1 of 2 pairs)", text)
         # The error grows with the label: mlp wins, 0.013 squared is 0.169e-3. nfgp has fewer pairs.
         best = [line for line in text.splitlines() if "**0.169**" in line]
-        self.assertEqual([line.split("|")[1].strip() for line in best], ["mlp", "mlp"])
-        rows = json.loads((folder / "table.json").read_text())["sequences"][0]["rows"]
-        mlp = next(row for row in rows if row["row"] == "mlp")
-        self.assertAlmostEqual(mlp["chamfer_squared"], 0.013**2, delta=1e-12)
-        self.assertAlmostEqual(mlp["aligned_hausdorff"], 3 * 0.013 / 2, delta=1e-12)
-        self.assertEqual((mlp["pairs"], mlp["training_seconds"]), (2, 12.5))
-        names = [row["row"] for row in rows][-2:]
-        self.assertTrue(names[0].startswith("straight") and names[1].startswith("floor"))
+        self.assertEqual({line.split("|")[1].strip() for line in best}, {"mlp"})
+        entries = compact.unpack(compact.read(folder / "data.json"))
+        mlp = next(each for each in entries if each["method"] == "mlp")
+        surface = mlp["evaluation"]["mean"]["surface"]
+        self.assertAlmostEqual(surface["chamfer_squared"], 0.013**2, delta=1e-12)
+        self.assertAlmostEqual(surface["aligned"]["hausdorff"], 3 * 0.013 / 2, delta=1e-12)
+        self.assertEqual(mlp["training_seconds"], 12.5)
+        # Each pair has a table of its own below that of their mean.
+        self.assertEqual(text.count("| mlp "), 2 + 5)
+        self.assertIn("### bear_walk, frames 16-30", text)
 
     def test_straight_lines_that_beat_every_row_are_marked(self):
         # A label of 60 letters has the error 0.07, straight lines 0.05.
@@ -137,13 +149,12 @@ class Experiments(unittest.TestCase):
 
     def test_the_record_says_how_it_was_made(self):
         self.paper("global-swaps", "--seed", "3")
-        record = json.loads((self.folder / "out/global-swaps/run.json").read_text())
+        record = compact.read(self.folder / "out/global-swaps/data.json")
         self.assertEqual(record["settings"]["seed"], 3)
         self.assertEqual(record["settings"]["steps"], 1000)
         self.assertIn("scripts/paper.py global-swaps --seed 3", record["command"])
         self.assertEqual(record["versions"]["isomorph"], "isomorph 0.0.0-fake")
         self.assertTrue(record["machine"]["processor"] and record["machine"]["cores"] >= 1)
-        self.assertEqual(len(record["calls"]), 1)
         wrong = {made["wrong pairs"] for made in record["inputs"].values()}
         self.assertEqual(wrong, {0, 10, 50, 100})
         words = self.calls()[0]
@@ -205,18 +216,22 @@ class Experiments(unittest.TestCase):
     def test_the_commands_of_a_dry_run_are_those_that_are_run(self):
         _, out, _ = self.paper("topology", "--dry-run")
         self.paper("topology")
-        record = json.loads((self.folder / "out/topology/run.json").read_text())
-        self.assertEqual(out.splitlines()[1:], [call["command"] for call in record["calls"]])
+        commands = [shlex.split(line)[1:] for line in out.splitlines()[1:]]
+        self.assertEqual(commands, self.calls())
 
     def test_results_of_other_settings_are_not_mixed(self):
         self.paper("sparse")
+        status, _, err = self.paper("sparse", "--seed", "1")
+        self.assertEqual(status, 1)
+        self.assertRegex(err, "data.json: seed = 0, now 1; set another --out")
+        (self.folder / "out/sparse/data.json").unlink()
         status, _, err = self.paper("sparse", "--seed", "1")
         self.assertEqual(status, 1)
         self.assertRegex(err, "run.json: seed = 0, now 1; set another --out")
 
     def test_a_second_look_at_finished_results_changes_nothing(self):
         self.assertEqual(self.paper("topology")[0], 0)
-        record = self.folder / "out/topology/run.json"
+        record = self.folder / "out/topology/data.json"
         before = json.loads(record.read_text()) | {"date": "2001-01-01"}
         record.write_text(json.dumps(before))
         status, out, _ = self.paper("topology")
@@ -229,7 +244,7 @@ class Experiments(unittest.TestCase):
 
     def test_tables_of_older_rows_are_written_anew(self):
         self.paper("topology")
-        table, text = (self.folder / "out/topology" / name for name in ("table.json", "table.md"))
+        table, text = (self.folder / "out/topology" / name for name in ("data.json", "table.md"))
         fresh = text.read_text()
         # As if a row had been run again since.
         table.write_text(table.read_text().replace("chamfer_squared", "chamfer_of_old", 1))
@@ -238,6 +253,44 @@ class Experiments(unittest.TestCase):
         self.assertNotIn("left as it was", out)
         strip = lambda lines: [line for line in lines.splitlines() if line.startswith("|")]
         self.assertEqual(strip(text.read_text()), strip(fresh))
+
+    def test_a_table_is_made_again_from_the_numbers_alone(self):
+        self.paper("divergence")
+        folder = self.folder / "out/divergence"
+        kept = {name: (folder / name).read_bytes() for name in EXPECTED_FILES}
+        for name in ("table.md", "figure.svg"):
+            (folder / name).unlink()
+        shutil.rmtree(self.folder / "work")
+        shutil.rmtree(self.folder / "in")
+        calls = self.log.read_text()
+        status, _, err = self.paper("divergence", "--table")
+        self.assertEqual(status, 0, err)
+        self.assertEqual({name: (folder / name).read_bytes() for name in EXPECTED_FILES}, kept)
+        self.assertEqual(self.log.read_text(), calls)
+        status, _, err = self.paper("sparse", "--table")
+        self.assertEqual(status, 1)
+        self.assertIn("run without --table first", err)
+
+    def test_rows_that_an_experiment_has_no_more_stay_in_its_table(self):
+        self.paper("topology")
+        path = self.folder / "out/topology/data.json"
+        path.write_text(path.read_text().replace('"nise"', '"a row of before"'))
+        status, out, err = self.paper("topology", "--table")
+        self.assertEqual(status, 0, err)
+        self.assertIn("| a row of before ", out)
+
+    def test_without_a_folder_of_sequences_it_is_said_how_to_name_one(self):
+        err = io.StringIO()
+        with (
+            mock.patch.dict(os.environ),
+            contextlib.redirect_stderr(err),
+            contextlib.redirect_stdout(io.StringIO()),
+        ):
+            os.environ.pop(command_line.SEQUENCES, None)
+            self.assertEqual(paper.main(["sparse", "--dry-run"]), 1)
+            self.assertRegex(err.getvalue(), "set --sequences or ISOMORPH_SEQUENCES.*README")
+            os.environ[command_line.SEQUENCES] = str(self.folder / "in")
+            self.assertEqual(paper.main(["sparse", "--dry-run"]), 0)
 
     def test_a_failed_run_is_said_and_leaves_no_table(self):
         os.environ["FAKE_FAILS"] = "1"

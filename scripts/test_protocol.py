@@ -37,6 +37,7 @@ class Protocol(unittest.TestCase):
     def protocol(self, *words):
         """The status, stdout and stderr of a command."""
         places = ["--sequences", self.folder / "in", "--out", self.folder / "out"]
+        places += ["--work", self.folder / "work"]
         out, err = io.StringIO(), io.StringIO()
         with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
             status = protocol.main([*words, *map(str, [*places, "--binary", self.binary])])
@@ -58,7 +59,7 @@ class Protocol(unittest.TestCase):
         row = next(line for line in text.splitlines() if line.startswith("| bear_walk 16-30"))
         self.assertIn("| 3 | 0.5130 (0.2890 to 0.6250) | 2.5000 | 0.0670 (0.0510 to 0.0750) |", row)
         found = json.loads((self.folder / "out/default.json").read_text())
-        self.assertEqual([len(pair["seeds"]) for pair in found["pairs"]], [3] * 7)
+        self.assertEqual([len(pair["methods"]) for pair in found["pairs"]], [3] * 7)
 
     def test_goals_that_are_missed_are_named_with_the_size_of_the_miss(self):
         self.protocol("--seeds", "0")
@@ -94,7 +95,7 @@ class Protocol(unittest.TestCase):
     def test_a_table_trains_nothing_and_says_where_nothing_is(self):
         status, _, err = self.protocol("--table")
         self.assertEqual(status, 1)
-        self.assertIn("no result of 'default'", err)
+        self.assertIn("default.json: cannot be read", err)
         self.assertFalse(self.log.exists())
         self.protocol("--seeds", "0")
         calls = self.log.read_text()

@@ -6,8 +6,9 @@ topology.py     two feet that merge: a sequence whose ends differ in topology
 experiments.py  the table of all experiments: data, not code
 inputs.py       makes the input files that a row of an experiment asks for
 runs.py         calls `isomorph compare` and reads what it measured
-command_line.py what several commands are asked in the same words
-report.py       table and numbers        figures.py  pictures        record.py  how it was made
+compact.py      all of it in one JSON file, from which tables and figures are made
+command_line.py options that several commands share
+report.py       tables        figures.py  pictures        record.py  how it was made
 """
 
 

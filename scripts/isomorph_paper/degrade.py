@@ -21,7 +21,7 @@ def generator(seed: int, *stream: object) -> np.random.Generator:
 def same_vertex_pairs(vertices: int, count: int, rng: np.random.Generator) -> np.ndarray:
     """(count, 2) pairs of a vertex with itself, in increasing order."""
     if count > vertices:
-        raise PaperError(f"{count} pairs asked of {vertices} vertices; take a finer sequence")
+        raise PaperError(f"{count} pairs wanted, {vertices} vertices there; take a finer sequence")
     chosen = np.sort(rng.choice(vertices, count, replace=False))
     return np.stack([chosen, chosen], axis=1)
 

@@ -54,6 +54,18 @@ def sequence_of(subject: Subject, sequences: Path, cache: Path) -> Sequence:
     return write_sequence(path, topology.feet_together(human), human.triangles)
 
 
+def true_volumes(subjects: tuple[Subject, ...], truths: dict[str, Sequence]) -> dict:
+    """Of each pair the volume of every frame from its first to its last, by the first one's."""
+    found = {}
+    for subject in subjects:
+        truth = truths[subject.sequence]
+        for first, last in subject.pairs:
+            volumes = [truth.volume(frame) for frame in range(first, last + 1)]
+            shares = [volume / volumes[0] for volume in volumes]
+            found[subject.sequence, first, last] = {"volume": shares}
+    return found
+
+
 def folder_of(cache: Path, seed: int, subject: Subject, wanted: Input) -> Path:
     """Where the files of an input lie. Its path says what it is, so no two share one."""
     (first, last), *more = subject.pairs

@@ -1,4 +1,8 @@
-"""run.json: how the results of a folder were made, so that anyone can make them again."""
+"""How results were made, so that anyone can make them again.
+
+run.json claims the work folder of an experiment for its settings while it runs. The record goes
+into the compact file when it is done.
+"""
 
 import datetime
 import importlib.metadata
@@ -28,44 +32,40 @@ def settings(experiment: str, budget: Budget) -> dict:
     }
 
 
-def check(folder: Path, wanted: dict) -> None:
-    """A PaperError if the folder holds results of other settings: they would share one table."""
-    path = folder / NAME
+def check(path: Path, wanted: dict) -> None:
+    """A PaperError if a file records results of other settings: they would share one table."""
     if not path.exists():
         return
     try:
         found = json.loads(path.read_text("utf-8"))["settings"]
     except (ValueError, KeyError, TypeError) as reason:
         raise PaperError(
-            f"{path}: not a record of this script; delete it or set another --out"
+            f"{path}: not a record of this script; delete it, or set another --out and --work"
         ) from reason
     for key, value in wanted.items():
         if found.get(key) != value:
             raise PaperError(
                 f"{path}: {key} = {found.get(key)!r}, now {value!r}; "
-                "set another --out, or delete the folder"
+                "set another --out and --work, or delete the folder"
             )
 
 
 def begin(folder: Path, wanted: dict) -> None:
-    """Claims the folder for these settings, so that no other run is mixed with this one."""
-    check(folder, wanted)
+    """Claims a work folder for these settings, so that no other run is mixed with this one."""
+    check(folder / NAME, wanted)
     if not (folder / NAME).exists():
         content = {"settings": wanted, "state": "unfinished"}
         write_atomically(folder / NAME, (json.dumps(content, indent=1) + "\n").encode())
 
 
-def write(folder: Path, wanted: dict, more: dict) -> None:
-    """Writes the record: the settings first, then `more`, then the machine and the versions."""
-    content = {
-        "settings": wanted,
-        **more,
+def of(command: str, binary: str) -> dict:
+    """What was called, when, where and of which versions."""
+    return {
+        "command": command,
         "date": now(),
         "machine": machine(),
-        "versions": versions(more["binary"]),
+        "versions": versions(binary),
     }
-    text = json.dumps(content, indent=1, allow_nan=False) + "\n"
-    write_atomically(folder / NAME, text.encode())
 
 
 def now() -> str:
@@ -82,9 +82,11 @@ def machine() -> dict:
     }
 
 
-def made_by(command: str, date: str, on: dict) -> str:
-    """The last line of a table: the command, the day, and the machine as `machine` tells it."""
-    return f"Made by `{command}` on {date[:10]}, {on['processor']}, {on['cores']} cores."
+def made_by(how: dict) -> str:
+    """The last line of a table: the command, the day and the machine of a record."""
+    on = how["machine"]
+    machine = f"{on['processor']}, {on['cores']} cores"
+    return f"Made by `{how['command']}` on {how['date'][:10]}, {machine}."
 
 
 def processor() -> str:

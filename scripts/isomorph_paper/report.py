@@ -1,15 +1,14 @@
-"""The table of an experiment, as Markdown for people and as JSON for programs.
+"""The table of an experiment, as Markdown.
 
 All numbers are means over the frames strictly between the ends, then over the pairs of a sequence,
 in normalised units (joint bounding box centred, mean area 1): DESIGN, section 4.
 """
 
-import json
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from .experiments import Experiment
-from .runs import Budget, Measured
+from . import record
+from .runs import Measured
 
 
 @dataclass(frozen=True)
@@ -180,34 +179,44 @@ def by_sequence(measured: list[Measured]) -> dict[str, list[Measured]]:
     return found
 
 
-def markdown(experiment: Experiment, budget: Budget, measured: list[Measured], how: str) -> str:
-    """The whole of table.md; `how` is the line that says how it was made."""
-    parts = [f"# {experiment.name}", experiment.about]
+def sections(measured: list[Measured]) -> list[str]:
+    """For each sequence its table; where it has several pairs, one for each of them too."""
+    parts = []
     for sequence, mine in by_sequence(measured).items():
-        pairs = ", ".join(
-            f"{first}-{last}" for first, last in dict.fromkeys(one.pair for one in mine)
+        pairs = list(dict.fromkeys(one.pair for one in mine))
+        shown = ", ".join(f"{first}-{last}" for first, last in pairs)
+        parts += [f"## {sequence}, frames {shown}", table(lines_of(mine))]
+        for pair in pairs if len(pairs) > 1 else ():
+            only = [one for one in mine if one.pair == pair]
+            parts += [f"### {sequence}, frames {pair[0]}-{pair[1]}", table(lines_of(only))]
+    return parts
+
+
+def markdown(name: str, content: dict, measured: list[Measured]) -> str:
+    """The whole of table.md, from the compact form and the rows of its results."""
+    parts = [f"# {name}", content["about"], *sections(measured), CAPTION]
+    parts += content.get("notes", [])
+    settings = content.get("settings")
+    if settings:
+        parts.append(
+            f"Rows had {settings['steps']:,} steps of {settings['batch']:,} points, "
+            f"seed {settings['seed']}. {record.made_by(content)}"
         )
-        parts += [f"## {sequence}, frames {pairs}", table(lines_of(mine))]
-    parts.append(CAPTION)
-    parts.append(
-        f"Rows had {budget.steps:,} steps of {budget.batch:,} points, seed {budget.seed}. {how}"
-    )
+    else:
+        parts += made_by_compare(content, measured)
     return "\n\n".join(parts) + "\n"
 
 
-def numbers(experiment: Experiment, measured: list[Measured]) -> str:
-    """The same as JSON, unscaled, with the recipe keys of each row."""
-    sequences = []
-    for sequence, mine in by_sequence(measured).items():
-        rows = [
-            {
-                "row": each.label,
-                "pairs": each.pairs,
-                "training_seconds": each.seconds,
-                **each.values,
-            }
-            for each in lines_of(mine)
-        ]
-        sequences.append({"sequence": sequence, "rows": rows})
-    content = {"experiment": experiment.name, "about": experiment.about, "sequences": sequences}
-    return json.dumps(content, indent=1, allow_nan=False) + "\n"
+def made_by_compare(content: dict, measured: list[Measured]) -> list[str]:
+    """How rows were made that have no settings in common: each on its own, then the commands."""
+    lines = ["| row | steps | points | seed | version | cores | processor | date |"]
+    lines.append("| --- | ---: | ---: | ---: | --- | ---: | --- | --- |")
+    for one in measured:
+        has = lambda key, of=one.entry: "-" if of.get(key) is None else of[key]
+        machine = one.entry.get("machine") or {}
+        cells = [one.row.label, has("steps"), has("batch"), has("seed"), has("isomorph")]
+        cells += [has("cores", machine), has("cpu", machine), str(has("date"))[:10]]
+        lines.append(f"| {' | '.join(map(str, cells))} |")
+    # A row that was made in the same way on each of its pairs is said once.
+    rows = "\n".join(dict.fromkeys(lines))
+    return [rows, "Made by", "```text\n" + "\n".join(content["commands"]) + "\n```"]

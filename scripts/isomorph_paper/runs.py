@@ -1,8 +1,8 @@
 """Calls `isomorph compare` and reads what it measured.
 
 `compare` keeps one JSON file per pair and method under DIR/SEQUENCE and does not repeat what is
-done, so an interrupted experiment goes on where it stopped. Those files are what is read here: an
-object with `method`, `from`, `to` and `evaluation` (src/evaluate/evaluation.rs).
+done, so an interrupted experiment goes on where it stopped. Those files lie in a work folder. Each
+is an object with `sequence`, `from`, `to`, `method` and `evaluation`. compact.py merges them.
 """
 
 import json
@@ -113,7 +113,7 @@ def planned(
 
 @dataclass(frozen=True)
 class Paths:
-    """Where things are: sequences, made inputs, and the results of this experiment."""
+    """Where things are: sequences, made inputs, and what `compare` leaves of this experiment."""
 
     sequences: Path
     cache: Path
@@ -161,7 +161,24 @@ class Measured:
         return self.entry["evaluation"]["frames"]
 
 
-def collect(experiment: Experiment, size: Size, results: Path) -> list[Measured]:
+def measured(rows: list[Row], entries: list[dict]) -> list[Measured]:
+    """Results with the rows that they are of; one of no row gets a row of its label alone.
+
+    Results are kept when a row is taken out of an experiment, and their tables show them.
+    """
+    known = {row.label: row for row in rows}
+    return [
+        Measured(
+            entry["sequence"],
+            (entry["from"], entry["to"]),
+            known.get(entry["method"]) or Row(entry["method"]),
+            entry,
+        )
+        for entry in entries
+    ]
+
+
+def collect(experiment: Experiment, size: Size, results: Path) -> list[dict]:
     """All rows on all pairs, in the order of the experiment; a PaperError if one is missing."""
     found = []
     for subject in experiment.subjects:
@@ -174,7 +191,7 @@ def collect(experiment: Experiment, size: Size, results: Path) -> list[Measured]
                         f"{results / subject.sequence}: no result of {row.label!r} on frames "
                         f"{pair[0]}-{pair[1]}; does `isomorph compare` fit these scripts?"
                     )
-                found.append(Measured(subject.sequence, pair, row, entry))
+                found.append(entry)
     return found
 
 
