@@ -29,6 +29,7 @@
 //! The command line is one front end of this library and uses nothing else.
 
 pub mod event;
+pub mod guide;
 
 mod atomic;
 mod backend;

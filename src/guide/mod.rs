@@ -1,0 +1,73 @@
+//! The guide: how to use isomorph, how it works, and how to carry the work on.
+//!
+//! | chapter | what it is for |
+//! |---|---|
+//! | [`first_steps`] | from nothing to a first result, and what to look at |
+//! | [`shapes`] | files, normals, correspondences, coordinates |
+//! | [`recipes`] | the settings of a run: presets, sections, the ten keys that people change |
+//! | [`results`] | what a run leaves, how to measure it, and how good the method is |
+//! | [`troubleshooting`] | from a symptom or a message to the key or command that helps |
+//! | [`glossary`] | the words of the field and of this project |
+//! | [`library`] | isomorph from your own Rust program |
+//! | [`method`] | the equations, where each lives, and what each part is worth |
+//! | [`design`] | decisions of the program, and what they rest on |
+//! | [`performance`] | how long a step takes on a CPU and on a GPU |
+//! | [`carrying_on`] | for those who change isomorph: the map, worked examples, tests |
+//!
+//! The chapters are the Markdown files of this folder. `links.txt` comes before each of them and turns
+//! links between chapters into links of this documentation: of two definitions of one name the first counts.
+
+pub mod first_steps {
+    #![doc = include_str!("links.txt")]
+    #![doc = include_str!("first_steps.md")]
+}
+
+pub mod shapes {
+    #![doc = include_str!("links.txt")]
+    #![doc = include_str!("shapes.md")]
+}
+
+pub mod recipes {
+    #![doc = include_str!("links.txt")]
+    #![doc = include_str!("recipes.md")]
+}
+
+pub mod results {
+    #![doc = include_str!("links.txt")]
+    #![doc = include_str!("results.md")]
+}
+
+pub mod troubleshooting {
+    #![doc = include_str!("links.txt")]
+    #![doc = include_str!("troubleshooting.md")]
+}
+
+pub mod glossary {
+    #![doc = include_str!("links.txt")]
+    #![doc = include_str!("glossary.md")]
+}
+
+pub mod library {
+    #![doc = include_str!("links.txt")]
+    #![doc = include_str!("library.md")]
+}
+
+pub mod method {
+    #![doc = include_str!("links.txt")]
+    #![doc = include_str!("method.md")]
+}
+
+pub mod design {
+    #![doc = include_str!("links.txt")]
+    #![doc = include_str!("design.md")]
+}
+
+pub mod performance {
+    #![doc = include_str!("links.txt")]
+    #![doc = include_str!("performance.md")]
+}
+
+pub mod carrying_on {
+    #![doc = include_str!("links.txt")]
+    #![doc = include_str!("carrying_on.md")]
+}
