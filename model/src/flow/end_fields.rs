@@ -19,7 +19,7 @@ use crate::operators::{ImplicitJet, Operators};
 /// What the parameters of the second network are numbered from. It stands in checkpoints.
 const SECOND: u64 = 1000;
 
-/// The shape of a [`EndFields`]: of both of its networks.
+/// The shape of [`EndFields`]: of both of its networks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EndFieldsConfig {
     /// Each network.

@@ -129,7 +129,7 @@ fn ball(radius: f64) -> (Vec<f64>, Vec<f64>) {
 }
 
 /// Evenly spread unit vectors: a Fibonacci lattice.
-fn directions(count: usize) -> Vec<[f64; 3]> {
+pub(crate) fn directions(count: usize) -> Vec<[f64; 3]> {
     let golden = std::f64::consts::PI * (3.0 - 5f64.sqrt());
     let direction = |k: usize| {
         let z = 1.0 - (2 * k + 1) as f64 / count as f64;

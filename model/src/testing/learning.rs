@@ -11,6 +11,7 @@ use crate::autodiff::{Activation, ModelBackend, TrainBackend};
 use crate::flow::end_terms::{EndSamples, EndWeights};
 use crate::flow::morph::Geometry;
 use crate::nets::ImplicitNetConfig;
+pub(crate) use crate::nets::implicit_net::directions;
 use crate::objective::Objective;
 
 /// A network small enough to be trained within a second, softplus of sharpness `beta`.
@@ -42,17 +43,6 @@ pub fn end_weights() -> EndWeights {
         off_surface: 0.01,
         distance: 0.1,
     }
-}
-
-/// Evenly spread unit vectors: a Fibonacci lattice.
-pub fn directions(count: usize) -> Vec<[f64; 3]> {
-    let golden = std::f64::consts::PI * (3.0 - 5f64.sqrt());
-    let direction = |k: usize| {
-        let z = 1.0 - (2 * k + 1) as f64 / count as f64;
-        let (ring, angle) = ((1.0 - z * z).sqrt(), golden * k as f64);
-        [ring * angle.cos(), ring * angle.sin(), z]
-    };
-    (0..count).map(direction).collect()
 }
 
 /// `count` samples on each of two spheres around the origin, and as many in space around them.

@@ -1,6 +1,6 @@
 //! The shape of a deformation, and how exactly its inverse is found.
 
-/// The shape of an [`Nfgp`].
+/// The shape of an [`Nfgp`](super::Nfgp).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NfgpConfig {
     /// Residual blocks, at least 1. `D` stretches by at most `(1 + bound)^blocks`.
