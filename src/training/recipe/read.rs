@@ -70,9 +70,16 @@ impl Recipe {
     ///
     /// # Errors
     /// If a path is not Unicode, or cannot be made absolute.
-    pub fn between(source: &Path, target: &Path) -> Result<Recipe, RecipeError> {
+    pub fn between(
+        source: impl AsRef<Path>,
+        target: impl AsRef<Path>,
+    ) -> Result<Recipe, RecipeError> {
         let mut entries = Entries::new();
-        for (id, path) in [("data.source", source), ("data.target", target)] {
+        let files = [
+            ("data.source", source.as_ref()),
+            ("data.target", target.as_ref()),
+        ];
+        for (id, path) in files {
             let key = catalogue::by_id(id).expect("a key of the table");
             let path = Value::Text(source::unicode(path)?.to_owned());
             entries.insert(key.id(), Entry::new(key, path, Place::Held));
