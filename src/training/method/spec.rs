@@ -113,6 +113,11 @@ impl MethodSpec {
         }
     }
 
+    /// Whether it has no surface of its own and moves the source's, which must be a mesh.
+    pub fn needs_mesh(&self) -> bool {
+        self.needs.mesh
+    }
+
     /// The method in messages: `velocity-field with implicit.geometry = "flow"`.
     pub fn described(&self) -> String {
         match self.geometry {

@@ -10,6 +10,11 @@ use super::{Recipe, catalogue, old};
 use crate::method::{METHODS, MethodSpec, spec_of};
 
 impl Recipe {
+    /// Whether a key such as "training.steps" does anything in the recipe's method.
+    pub fn has(&self, id: &str) -> bool {
+        catalogue::by_id(id).is_some_and(|key| spec_of(self).acts_on(key))
+    }
+
     /// The keys that act in the recipe's method, each with its value, in the order in which they are
     /// printed; those of `[[data.keyframe]]` are not among them.
     pub(super) fn acting(&self) -> Vec<(&'static Key, Value)> {

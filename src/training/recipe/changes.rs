@@ -2,7 +2,8 @@
 
 use super::keys::PRESET;
 use super::rule::Value;
-use super::schema::{Key, Setting};
+use super::schema::Key;
+use super::setting::Setting;
 use super::{Change, Recipe};
 
 /// What stands for the value of a key that does nothing.

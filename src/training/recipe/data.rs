@@ -20,7 +20,8 @@ use std::path::{Path, PathBuf};
 
 use super::keys::DataKeys;
 use super::rule::{Rule, Value};
-use super::schema::{Key, Keyed, Setting};
+use super::schema::{Key, Keyed};
+use super::setting::Setting;
 use super::words::{Correspondences, NormalSource};
 
 /// The key frames and how they become points.

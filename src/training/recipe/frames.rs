@@ -8,7 +8,8 @@ use super::entry::{Entries, Entry, keyframe_id};
 use super::error::RecipeError;
 use super::keys::DataKeys;
 use super::rule::Value;
-use super::schema::{Key, Keyed, Setting};
+use super::schema::{Key, Keyed};
+use super::setting::Setting;
 use super::words::Correspondences;
 
 /// Key frames and what is known between each and the next.

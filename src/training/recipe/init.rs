@@ -7,7 +7,8 @@ use std::path::Path;
 
 use super::print::{about, comment};
 use super::rule::Value;
-use super::schema::{Key, Section, Setting};
+use super::schema::{Key, Section};
+use super::setting::Setting;
 use super::source::unicode;
 use super::words::{Correspondences, GeometryKind, Preset};
 use super::{Recipe, RecipeError, catalogue};
@@ -94,7 +95,8 @@ impl Recipe {
         };
         let mut text = comment(
             "A recipe of isomorph. A line such as `#training.steps = 1000` shows the value of the preset. \
-             To change it, remove the first # and edit the value. `isomorph train FILE` starts the run.",
+             To change it, remove the first # and edit the value. Each key is written with its section, as \
+             in `--set`. `isomorph train FILE` starts the run.",
         );
         for (id, path) in [("data.source", source), ("data.target", target)] {
             let key = catalogue::by_id(id).expect("a key of the table");
@@ -102,6 +104,7 @@ impl Recipe {
             text.push_str(&format!("\n{}{id} = {path}\n", about(key, key.doc)));
         }
         text.push_str(&title("The keys that people change"));
+        text.push('\n');
         for (id, meaning) in FIRST {
             let key = catalogue::by_id(id).expect("a key of the table");
             text.push_str(&page.line(key, meaning));
@@ -162,7 +165,7 @@ impl Page {
 
     /// What the other methods are, and every key that acts in some of them and not in this one.
     fn others(&self) -> String {
-        let mut text = String::new();
+        let mut text = String::from("\n");
         for spec in METHODS.iter().filter(|spec| **spec != self.spec) {
             let line = format!("{}: {}.", spec.described(), spec.about);
             text.push_str(&comment(&line));
@@ -217,7 +220,7 @@ fn is_first(key: &Key) -> bool {
 
 /// The comment above a group of sections.
 fn title(text: &str) -> String {
-    format!("\n# ===== {text} =====\n\n")
+    format!("\n# ===== {text} =====\n")
 }
 
 /// The comment above the keys of a section.

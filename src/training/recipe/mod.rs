@@ -17,7 +17,7 @@
 //! | file | what it holds |
 //! |---|---|
 //! | `keys.rs` | the table of the keys that more than one method has |
-//! | `schema.rs`, `rule.rs`, `words.rs` | how a row becomes a field, what it accepts, its enums |
+//! | `schema.rs`, `setting.rs`, `rule.rs`, `words.rs` | how a row becomes a field, of which type, what it accepts, its enums |
 //! | `data.rs` | key frames |
 //! | `error.rs` | what can be wrong |
 //!
@@ -51,6 +51,7 @@ mod print;
 mod read;
 pub(crate) mod rule;
 pub(crate) mod schema;
+pub(crate) mod setting;
 mod source;
 #[cfg(test)]
 mod tests;

@@ -1,8 +1,6 @@
 //! How the recipe's keys are declared: `section!` turns one table of keys into the struct that the
 //! program reads and into [`Key`]s, from which parsing, checks and printing all work.
 
-use std::path::PathBuf;
-
 use super::rule::{Rule, Value};
 use super::words::Preset;
 
@@ -78,58 +76,6 @@ pub(crate) trait Keyed: Sized {
     fn to_values(&self) -> Vec<Option<Value>>;
 }
 
-/// A type that a field of the recipe can have.
-pub(crate) trait Setting: Sized {
-    /// The field, `None` if the value is of another type.
-    fn from_value(value: Value) -> Option<Self>;
-
-    /// The value that gives the field back.
-    fn to_value(&self) -> Option<Value>;
-
-    /// The field where the recipe has no value, if it can do without.
-    fn absent() -> Option<Self> {
-        None
-    }
-}
-
-impl<T: Setting> Setting for Option<T> {
-    fn from_value(value: Value) -> Option<Self> {
-        T::from_value(value).map(Some)
-    }
-
-    fn to_value(&self) -> Option<Value> {
-        self.as_ref().and_then(Setting::to_value)
-    }
-
-    fn absent() -> Option<Self> {
-        Some(None)
-    }
-}
-
-macro_rules! settings {
-    ($($Type:ty as $Variant:ident: $into:expr, $from:expr;)+) => { $(
-        impl Setting for $Type {
-            fn from_value(value: Value) -> Option<$Type> {
-                match value { Value::$Variant(inner) => $into(inner), _ => None }
-            }
-
-            fn to_value(&self) -> Option<Value> {
-                Some(Value::$Variant($from(self)))
-            }
-        }
-    )+ };
-}
-
-settings! {
-    u64 as Whole: Some, |number: &u64| *number;
-    usize as Whole: |number| usize::try_from(number).ok(), |number: &usize| *number as u64;
-    f64 as Number: Some, |number: &f64| *number;
-    Vec<f64> as Numbers: Some, |numbers: &Vec<f64>| numbers.clone();
-    bool as Flag: Some, |flag: &bool| *flag;
-    PathBuf as Text: |text| Some(PathBuf::from(text)),
-        |path: &PathBuf| path.to_string_lossy().into_owned();
-}
-
 /// Declares one section of keys, each with its type, its four preset columns and its rule. A doc
 /// comment becomes both the field's documentation and the comment in the TOML.
 macro_rules! section {
@@ -184,15 +130,15 @@ macro_rules! section {
                 let mut values = values.into_iter();
                 Self { $(
                     $field: match values.next().flatten() {
-                        Some(value) => $crate::recipe::schema::Setting::from_value(value),
-                        None => $crate::recipe::schema::Setting::absent(),
+                        Some(value) => $crate::recipe::setting::Setting::from_value(value),
+                        None => $crate::recipe::setting::Setting::absent(),
                     }
                     .expect("one value per key, of the type that its rule admits"),
                 )+ }
             }
 
             fn to_values(&self) -> Vec<Option<$crate::recipe::rule::Value>> {
-                vec![$( $crate::recipe::schema::Setting::to_value(&self.$field), )+]
+                vec![$( $crate::recipe::setting::Setting::to_value(&self.$field), )+]
             }
         }
     };

@@ -8,7 +8,7 @@ use isomorph_model::operators::Derivatives;
 use isomorph_model::trajectory::Integrator;
 
 use super::rule::{Value, looks_like_path};
-use super::schema::Setting;
+use super::setting::Setting;
 
 /// Declares enums whose variants are words of the recipe.
 macro_rules! words {

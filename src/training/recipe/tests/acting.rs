@@ -17,7 +17,8 @@ fn a_key_of_the_other_geometry_is_an_error_with_its_line_and_its_home() {
         "recipe.toml:6: loss.level-set = 3: does nothing in the method velocity-field with \
          implicit.geometry = \"flow\"; delete this line (it acts in implicit.geometry = \"network\")"
     );
-    assert!(parsed(&text, &["implicit.geometry=network"]).is_ok());
+    let network = parsed(&text, &["implicit.geometry=network"]).expect("it acts there");
+    assert!(network.has("loss.level-set") && !network.has("loss.distance"));
     assert!(parsed(&format!("preset = \"paper\"\n{text}"), &[]).is_ok());
     assert_eq!(
         refused(SHAPES, &["preset=paper", "loss.distance=1"]),

@@ -14,15 +14,16 @@ fn an_integer_is_a_number_but_a_float_is_not_a_whole_number() {
         admitted(Rule::number(0.0, 9.0), "3"),
         Ok(Value::Number(3.0))
     );
-    assert_eq!(admitted(Rule::whole(0, 20_000), "3.0").unwrap_err(), {
-        "a whole number from 0 to 20_000"
-    });
+    assert_eq!(
+        admitted(Rule::whole(0, 20_000), "3.0").expect_err("refused"),
+        { "a whole number from 0 to 20_000" }
+    );
 }
 
 #[test]
 fn infinities_and_what_overflows_single_precision_are_refused() {
     for text in ["inf", "-inf", "nan", "1e999", "3.5e38"] {
-        let refused = admitted(Rule::positive_or_zero(), text).unwrap_err();
+        let refused = admitted(Rule::positive_or_zero(), text).expect_err("refused");
         assert_eq!(
             refused, "a finite number in single precision, 0 or more",
             "{text}"
@@ -53,7 +54,7 @@ fn a_list_is_refused_for_one_bad_number_and_for_having_none() {
         Ok(Value::Numbers(vec![1.0, 0.5]))
     );
     for text in ["[]", "[1, 0]", "[1, \"2\"]", "[[1]]", "1"] {
-        let refused = admitted(rule, text).unwrap_err();
+        let refused = admitted(rule, text).expect_err("refused");
         assert_eq!(
             refused, "a list of numbers, each above 0 and at most 10",
             "{text}"
@@ -69,7 +70,7 @@ fn a_misspelt_word_is_not_taken_for_a_path() {
         Ok(Value::Text("pairs.csv".into()))
     );
     assert_eq!(
-        admitted(rule, "'same-vertex'").unwrap_err(),
+        admitted(rule, "'same-vertex'").expect_err("refused"),
         "\"none\", \"same-vertices\" or the path of a file (folder/name.extension)"
     );
 }
