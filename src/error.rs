@@ -18,6 +18,7 @@ use crate::recipe::RecipeError;
 use crate::session::checkpoint::CheckpointError;
 use crate::session::folder::FolderError;
 use crate::session::learner::LearnerError;
+use crate::session::metrics::MetricsError;
 use crate::surface::FramesError;
 
 /// What kind of thing went wrong.
@@ -141,7 +142,6 @@ kinds! {
     StoreError: |_| ErrorKind::Failure;
     DigestError: |_| ErrorKind::Failure;
     ReportError: |_| ErrorKind::Failure;
-    LearnerError: |_| ErrorKind::Failure;
     io::Error: |_| ErrorKind::Failure;
     serde_json::Error: |_| ErrorKind::Failure;
     fmt::Error: |_| ErrorKind::Failure;
@@ -149,6 +149,10 @@ kinds! {
     BackendError: |error| match error {
         BackendError::Absent(_) | BackendError::Device { .. } => ErrorKind::Usage,
         BackendError::NoDevice { .. } => ErrorKind::Failure,
+    };
+    LearnerError: |error| match error {
+        LearnerError::Missing(_) | LearnerError::NotHere(_) => ErrorKind::Usage,
+        _ => ErrorKind::Failure,
     };
     MatchError: |error| match error {
         MatchError::Option { .. } => ErrorKind::Usage,
@@ -162,6 +166,7 @@ kinds! {
         CheckpointError::Io { .. } => ErrorKind::Failure,
         _ => ErrorKind::Input,
     };
+    MetricsError: |_| ErrorKind::Input;
     FolderError: |error| match error {
         FolderError::Io { .. } => ErrorKind::Failure,
         _ => ErrorKind::Usage,

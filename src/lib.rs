@@ -60,7 +60,12 @@ pub use session::folder::is_run;
 pub use session::stop::StopFlag;
 pub use session::trained::{Distances, Surface};
 pub use session::{Session, Trained};
-pub use shape::Keyframes;
+pub use shape::{Keyframe, Keyframes, PointCloud};
+
+/// What a run logs of its steps: `metrics.jsonl`, written and read.
+pub mod metrics {
+    pub use crate::session::metrics::{Metrics, TermMetrics};
+}
 
 /// Corresponding vertices of two shapes, found from the shapes alone.
 pub mod correspondence {

@@ -30,7 +30,7 @@ use std::io;
 use crate::atomic::write_atomically;
 use crate::charts::ChartError;
 
-pub use comparison::{Absent, Comparison, MethodMean, MethodResult, PairComparison};
+pub use comparison::Comparison;
 pub use digest::{DigestError, Inputs};
 pub use entry::{Entry, Machine, Network, Run, command_line, now};
 pub use figure::error_figure;

@@ -108,6 +108,7 @@ impl Store {
     ///
     /// # Errors
     /// [`StoreError::Io`] if the folder cannot be made.
+    #[cfg(test)]
     pub fn open(results: &Path, sequence: &str) -> Result<Self, StoreError> {
         let store = Self::at(results, sequence);
         store.create()?;

@@ -147,6 +147,7 @@ impl Reference {
     }
 
     /// The frames that are evaluated.
+    #[cfg(test)]
     pub fn frames(&self) -> impl ExactSizeIterator<Item = usize> {
         self.frames.iter().map(|frame| frame.frame)
     }

@@ -26,7 +26,6 @@ mod neighbours;
 pub(crate) mod testing;
 pub(crate) mod winding;
 
-pub use components::Component;
 pub use density::cloud_area;
 pub use edges::EdgeSharing;
 pub(crate) use edges::weld;

@@ -51,7 +51,7 @@ use rayon::prelude::*;
 pub use error::MatchError;
 pub use options::MatchOptions;
 pub use outcome::{Coverage, Cycle, Matching, Quantiles, Rigid};
-pub use pairs::{MatchedPair, TOLERANCE};
+pub use pairs::MatchedPair;
 pub use rotation::RigidMotion;
 
 use crate::shape::{Normalisation, Shape};

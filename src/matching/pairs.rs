@@ -114,7 +114,7 @@ pub(super) fn mutual(source: (Laid<'_>, &Sites), target: (Laid<'_>, &Sites)) -> 
     let (forth, counter) = (nearest(&ours, &theirs), nearest(&theirs, &ours));
     let normal =
         |side: &(Laid<'_>, &Sites), k: usize| side.0.surface.normals[side.1.anchors[k] as usize];
-    let pair = |(i, found): (usize, &crate::shape::Neighbour)| {
+    let pair = |(i, found): (usize, &crate::geometry::Neighbour)| {
         let j = found.index as usize;
         if counter[j].index as usize != i {
             return None;

@@ -8,25 +8,11 @@ use glam::{Mat3, Vec3};
 /// Empty border round the surfaces, as a share of the panel's height.
 const MARGIN: f32 = 0.06;
 
-/// A coordinate axis.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Axis {
-    /// The first coordinate.
-    X,
-    /// The second coordinate; up in most character animation files.
-    #[default]
-    Y,
-    /// The third coordinate; up in most scans and CAD files.
-    Z,
-}
-
 /// From where and how large the surfaces are seen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
-    /// The axis that points up in the picture. No mesh file states it.
-    pub up: Axis,
-    /// Turn of the camera about the up axis in degrees. At 0 the camera stands on the axis that
-    /// follows `up` cyclically (z for y, x for z), at 90 on the one after that.
+    /// Turn of the camera about the y axis, which is up, in degrees. At 0 the camera stands on the z
+    /// axis, at 90 on the x axis.
     pub azimuth: f32,
     /// Height of the camera over the horizon in degrees, -90 to 90.
     pub elevation: f32,
@@ -38,7 +24,6 @@ impl Default for View {
     /// From the front and a little from the side and above; y up; 320 pixels.
     fn default() -> Self {
         Self {
-            up: Axis::Y,
             azimuth: 35.0,
             elevation: 14.0,
             height: 320,
@@ -91,14 +76,7 @@ impl Camera {
 
 /// The camera's directions as rows: a right-handed orthonormal basis.
 fn directions(view: &View) -> Mat3 {
-    let up_axis = view.up as usize;
-    let vector = |front: f32, side: f32, up: f32| {
-        let mut parts = [0.0; 3];
-        parts[up_axis] = up;
-        parts[(up_axis + 1) % 3] = front;
-        parts[(up_axis + 2) % 3] = side;
-        Vec3::from(parts)
-    };
+    let vector = |front: f32, side: f32, up: f32| Vec3::new(side, up, front);
     let (sin_a, cos_a) = view.azimuth.to_radians().sin_cos();
     let (sin_e, cos_e) = view.elevation.to_radians().sin_cos();
     let right = vector(-sin_a, cos_a, 0.0);
@@ -111,9 +89,8 @@ fn directions(view: &View) -> Mat3 {
 mod tests {
     use super::*;
 
-    fn view(up: Axis, azimuth: f32) -> View {
+    fn view(azimuth: f32) -> View {
         View {
-            up,
             azimuth,
             elevation: 0.0,
             height: 100,
@@ -121,16 +98,13 @@ mod tests {
     }
 
     #[test]
-    fn the_up_axis_points_up_and_the_camera_turns_from_the_axis_after_it() {
-        for up in [Axis::X, Axis::Y, Axis::Z] {
-            for (azimuth, front) in [(0.0, 1), (90.0, 2)] {
-                let turn = directions(&view(up, azimuth));
-                let axis = |step: usize| Vec3::AXES[(up as usize + step) % 3];
-                // f32 rounding of sines and cosines.
-                assert!((turn * axis(0)).abs_diff_eq(Vec3::Y, 1e-6), "{up:?}");
-                assert!((turn * axis(front)).abs_diff_eq(Vec3::Z, 1e-6), "{up:?}");
-                assert!((turn.determinant() - 1.0).abs() < 1e-6, "{up:?}");
-            }
+    fn y_points_up_and_the_camera_turns_from_z_to_x() {
+        for (azimuth, front) in [(0.0, Vec3::Z), (90.0, Vec3::X)] {
+            let turn = directions(&view(azimuth));
+            // f32 rounding of sines and cosines.
+            assert!((turn * Vec3::Y).abs_diff_eq(Vec3::Y, 1e-6), "{azimuth}");
+            assert!((turn * front).abs_diff_eq(Vec3::Z, 1e-6), "{azimuth}");
+            assert!((turn.determinant() - 1.0).abs() < 1e-6, "{azimuth}");
         }
     }
 
@@ -141,7 +115,7 @@ mod tests {
                 .map(Vec3::from)
                 .into_iter()
         };
-        let view = view(Axis::Y, 0.0);
+        let view = view(0.0);
         let camera = Camera::new(corners(), &view, 10);
         // 6 units fill 88 of 100 rows, 4 units 58.67 columns; with the border, rounded up.
         assert_eq!((camera.width, camera.height), (71, 100));

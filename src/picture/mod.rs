@@ -23,7 +23,7 @@ use crate::atomic::write_atomically;
 use crate::geometry::vertex_normals;
 use camera::Camera;
 use canvas::Canvas;
-pub use camera::{Axis, View};
+pub use camera::View;
 use raster::Projected;
 
 const WHITE: [u8; 3] = [255; 3];
@@ -151,7 +151,6 @@ mod tests {
 
     /// From the front, y up.
     const FRONT: View = View {
-        up: Axis::Y,
         azimuth: 0.0,
         elevation: 0.0,
         height: 200,

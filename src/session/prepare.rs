@@ -121,6 +121,18 @@ fn times(recipe: &Recipe) -> Vec<f64> {
         .collect()
 }
 
+impl Keyframes {
+    /// The shapes of a recipe as training samples them: their points and normals, normalised, with what was
+    /// decided about them in [`Keyframes::notes`]. Pairs are found if the recipe says so.
+    ///
+    /// # Errors
+    /// A shape that cannot be read or sampled, pairs that cannot be read or found.
+    pub fn of(recipe: &Recipe) -> Result<Self> {
+        let prepared = prepare(recipe, &read(recipe)?, None, &mut |_| {})?;
+        Ok(prepared.keyframes)
+    }
+}
+
 impl Prepared {
     /// Writes pairs that were found into the run, for whoever goes on with it, and gives what is to be
     /// reported of them.

@@ -235,6 +235,12 @@ impl Session {
             }
             None => Vec::new(),
         };
+        let (recipe, engine) = (self.recipe.clone(), &*self.engine);
+        let learner = match checkpoint {
+            Some(checkpoint) => Learner::resume(recipe, keyframes, engine, checkpoint)?,
+            None => Learner::new(recipe, keyframes, engine)?,
+        };
+        // Nothing is written before here.
         let step = checkpoint.as_ref().map_or(0, |found| found.state.step);
         let mut log = RunLog::open(run.path(), Some(step))?;
         let mut events: Vec<Event> = prepared.keep(&run)?.into_iter().collect();
@@ -255,11 +261,6 @@ impl Session {
             let text = self.recipe.to_toml();
             write_atomically(&run.recipe(), |out| out.write_all(text.as_bytes()))?;
         }
-        let (recipe, engine) = (self.recipe.clone(), &*self.engine);
-        let learner = match checkpoint {
-            Some(checkpoint) => Learner::resume(recipe, keyframes, engine, checkpoint)?,
-            None => Learner::new(recipe, keyframes, engine)?,
-        };
         Ok(Begun::new(run, log, learner, &prepared))
     }
 }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use super::checkpoint::Checkpoint;
 use super::folder::RunFolder;
 use super::learned;
+use super::metrics::{self, Metrics};
 use crate::backend::Backend;
 use crate::cubes::Grid;
 use crate::error::{Error, Result};
@@ -117,6 +118,14 @@ impl Trained {
 
     pub(super) fn folder(&self) -> &RunFolder {
         &self.folder
+    }
+
+    /// What the run has logged of its steps.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or holds something else.
+    pub fn metrics(&self) -> Result<Vec<Metrics>> {
+        Ok(Metrics::read(&self.folder.path().join(metrics::FILE))?)
     }
 
     /// The surface at time `t`, 0 (the first shape) to 1 (the last); `resolution`: cells of the extraction

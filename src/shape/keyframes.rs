@@ -67,7 +67,7 @@ pub struct DataOptions {
 
 /// The points of one shape in normalised coordinates.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Cloud {
+pub struct PointCloud {
     /// Positions.
     pub points: Vec<[f32; 3]>,
     /// Unit normals, one per point.
@@ -80,7 +80,7 @@ pub struct Keyframe {
     /// Its time, 0 to 1.
     pub time: f64,
     /// Its points, normalised.
-    pub cloud: Cloud,
+    pub cloud: PointCloud,
 }
 
 /// Two or more shapes at their times, made ready for training.
@@ -118,13 +118,13 @@ impl Keyframes {
 
 /// Searches around a cloud, each made on its first use: most methods need none.
 struct Around {
-    cloud: Cloud,
+    cloud: PointCloud,
     distance: OnceLock<SignedDistance>,
     search: OnceLock<NeighbourSearch>,
 }
 
 impl Around {
-    fn new(cloud: &Cloud) -> Self {
+    fn new(cloud: &PointCloud) -> Self {
         Self {
             cloud: cloud.clone(),
             distance: OnceLock::new(),
@@ -215,7 +215,7 @@ pub fn prepare(shapes: &[Shape], options: &DataOptions) -> Result<Keyframes, Sha
         let (points, normals) =
             points_of(shape, options.points, options.normals, &mut rng, &mut notes)?;
         let points = points.into_iter().map(|point| normalisation.apply(point));
-        let cloud = Cloud {
+        let cloud = PointCloud {
             points: points.collect(),
             normals,
         };

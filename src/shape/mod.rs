@@ -21,14 +21,13 @@ mod normalise;
 mod normals;
 mod sample;
 
-pub use crate::formats::{FEWEST_POINTS, Sequence, Shape, ShapeError, read};
-pub use crate::geometry::{Bounds, Neighbour, NeighbourSearch, cloud_area};
+pub use crate::formats::{FEWEST_POINTS, Shape, ShapeError};
+pub use crate::geometry::{Bounds, NeighbourSearch};
 pub use correspond::Correspondences;
-pub use distance::SignedDistance;
 pub use normalise::Normalisation;
-pub use normals::{EstimatedNormals, estimate_normals};
+pub use normals::estimate_normals;
 pub(crate) use keyframes::points_of;
 pub use keyframes::{
-    Cloud, CorrespondenceSource, DataOptions, Keyframe, Keyframes, NormalSource, prepare,
+    CorrespondenceSource, DataOptions, Keyframe, Keyframes, NormalSource, PointCloud, prepare,
 };
 pub use sample::{SurfaceSamples, sample_surface};

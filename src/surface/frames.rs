@@ -81,8 +81,6 @@ pub struct Frame {
     pub left_out: usize,
     /// Whether it reaches the box, and so may be open there.
     pub touches_box: bool,
-    /// The share of the grid's nodes at which f was evaluated.
-    pub evaluated: f64,
 }
 
 /// Writes the frames and `frames.json`; `done` is told of each and may stop the work by returning false.
@@ -157,7 +155,6 @@ fn write_frame(
         components,
         left_out,
         touches_box,
-        evaluated,
     } = learned.surface_at(grid, time, options.smallest_component, &mut |_| {})?;
     let (normals, slope_error) = learned.normals(&mesh, time);
     let mut placed = mesh.moved(|x| learned.normalisation.invert(x));
@@ -178,7 +175,6 @@ fn write_frame(
         components,
         left_out,
         touches_box,
-        evaluated,
     })
 }
 

@@ -36,8 +36,6 @@ pub struct Found {
     pub left_out: usize,
     /// Whether the box cuts it off.
     pub touches_box: bool,
-    /// The share of the grid's nodes at which the field was evaluated.
-    pub evaluated: f64,
 }
 
 impl Learned {
@@ -70,7 +68,6 @@ impl Learned {
             components,
             left_out: all - components,
             touches_box: found.touches_box,
-            evaluated: found.evaluated as f64 / found.grid_points as f64,
         })
     }
 
@@ -83,7 +80,6 @@ impl Learned {
             mesh,
             left_out: 0,
             touches_box: false,
-            evaluated: 0.0,
         })
     }
 

@@ -23,7 +23,7 @@ use crate::samples::Batch;
 use crate::settings::end_weights;
 
 /// What one step is made from.
-pub struct FlowStep<'a, B: TrainBackend> {
+pub(crate) struct FlowStep<'a, B: TrainBackend> {
     /// The Velocity-Net, the samples' numbers, weights and methods.
     pub motion: Motion<'a, B>,
     /// Decides which networks train.
@@ -39,7 +39,7 @@ pub struct FlowStep<'a, B: TrainBackend> {
 impl<B: TrainBackend> FlowStep<'_, B> {
     /// The terms of the objective: of the end fields at `samples`, of the source and of the target, and of
     /// the velocity field at the batch.
-    pub fn objective(&self, batch: &Batch, samples: [&EndSamples<B>; 2]) -> Objective<B> {
+    pub(crate) fn objective(&self, batch: &Batch, samples: [&EndSamples<B>; 2]) -> Objective<B> {
         let settings = self.motion.settings;
         let weights = end_weights(&settings.loss);
         let mut objective = self

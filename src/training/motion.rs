@@ -16,7 +16,7 @@ use crate::tensors::{column, rows};
 
 /// The Velocity-Net in one step.
 #[derive(Clone, Copy)]
-pub struct Motion<'a, B: TrainBackend> {
+pub(crate) struct Motion<'a, B: TrainBackend> {
     /// Weights and methods.
     pub settings: &'a Settings,
     /// The Velocity-Net.
@@ -28,7 +28,7 @@ pub struct Motion<'a, B: TrainBackend> {
 }
 
 /// The samples at the times to which `V` carries them, as constants.
-pub struct Still<B: TrainBackend> {
+pub(crate) struct Still<B: TrainBackend> {
     /// `[n, 3]`.
     pub positions: Tensor<B::InnerBackend, 2>,
     /// Transported normals, `[n, 3]`, where they were asked for and the data has normals.
@@ -37,7 +37,7 @@ pub struct Still<B: TrainBackend> {
 
 /// Points and times at which the terms between the ends are taken, constants: the band first, then the
 /// box.
-pub struct Collocation<B: TrainBackend> {
+pub(crate) struct Collocation<B: TrainBackend> {
     /// `[n, 3]`.
     pub x: Tensor<B, 2>,
     /// `[n, 1]`.
@@ -47,14 +47,14 @@ pub struct Collocation<B: TrainBackend> {
 }
 
 /// Whether the batch has a normal at every point that is carried.
-pub fn has_normals(batch: &Batch) -> bool {
+pub(crate) fn has_normals(batch: &Batch) -> bool {
     batch.starts.normals.len() == batch.starts.points.len()
 }
 
 impl<B: TrainBackend> Motion<'_, B> {
     /// Carries the correspondences to the other end, which gives the matching term of weight `weight`,
     /// and with them the starts to `stops`, none if that is empty: the positions of these.
-    pub fn carry_tracked(
+    pub(crate) fn carry_tracked(
         &self,
         batch: &Batch,
         stops: &[f32],
@@ -91,7 +91,7 @@ impl<B: TrainBackend> Motion<'_, B> {
 
     /// Carries the starts to the stops of the batch without a graph, with their normals if they are wanted
     /// and there are any.
-    pub fn carry_constants(&self, batch: &Batch, normals: bool) -> Still<B> {
+    pub(crate) fn carry_constants(&self, batch: &Batch, normals: bool) -> Still<B> {
         let settings = self.settings;
         let v = self.v.valid();
         let x = rows::<B::InnerBackend, 3>(&batch.starts.points, self.device);
@@ -116,7 +116,7 @@ impl<B: TrainBackend> Motion<'_, B> {
     }
 
     /// The collocation points of a batch whose carried points are `still`.
-    pub fn collocation(&self, batch: &Batch, still: &Still<B>) -> Collocation<B> {
+    pub(crate) fn collocation(&self, batch: &Batch, still: &Still<B>) -> Collocation<B> {
         let (band, count) = (batch.offsets.len(), batch.starts.points.len());
         let repeats = band.div_ceil(count).max(1);
         let around = |carried: Tensor<B::InnerBackend, 2>| {
@@ -142,7 +142,7 @@ impl<B: TrainBackend> Motion<'_, B> {
     }
 
     /// The priors of `V` at the collocation points, and its jet there: `None` if nothing needs it.
-    pub fn priors(
+    pub(crate) fn priors(
         &self,
         at: &Collocation<B>,
         wanted: bool,
@@ -181,7 +181,7 @@ impl<B: TrainBackend> Motion<'_, B> {
     }
 
     /// The jet of a `V` that does not train, as constants.
-    pub fn constant_jet(&self, at: &Collocation<B>) -> VelocityJet<B> {
+    pub(crate) fn constant_jet(&self, at: &Collocation<B>) -> VelocityJet<B> {
         let still = self.v.valid();
         let (x, t) = (at.x.clone().inner(), at.t.clone().inner());
         let request = VelocityRequest::default();
@@ -195,13 +195,13 @@ impl<B: TrainBackend> Motion<'_, B> {
 }
 
 /// Whether any term is made of the jet of `V` alone.
-pub fn has_priors(loss: &LossRecipe) -> bool {
+pub(crate) fn has_priors(loss: &LossRecipe) -> bool {
     let weights = [loss.smoothness, loss.divergence, loss.strain, loss.screw];
     weights.iter().any(|weight| *weight > 0.0)
 }
 
 /// Whether any term is made of `dV/dt`.
-pub fn needs_rate(loss: &LossRecipe) -> bool {
+pub(crate) fn needs_rate(loss: &LossRecipe) -> bool {
     loss.screw > 0.0
 }
 

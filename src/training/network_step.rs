@@ -18,7 +18,7 @@ use crate::samples::Batch;
 use crate::tensors::{column, rows};
 
 /// What one step is made from.
-pub struct Step<'a, B: TrainBackend> {
+pub(crate) struct Step<'a, B: TrainBackend> {
     /// The Velocity-Net, the samples' numbers, weights and methods.
     pub motion: Motion<'a, B>,
     /// Decides which networks train.
@@ -41,7 +41,7 @@ struct Carried<B: TrainBackend> {
 
 impl<B: TrainBackend> Step<'_, B> {
     /// The terms of the objective for one batch.
-    pub fn objective(&self, batch: &Batch) -> Objective<B> {
+    pub(crate) fn objective(&self, batch: &Batch) -> Objective<B> {
         let mut objective = Objective::new();
         let (carried, still) = self.carry(batch, &mut objective);
         let at = self.motion.collocation(batch, &still);

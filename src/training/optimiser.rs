@@ -8,10 +8,10 @@ use burn::tensor::backend::AutodiffBackend;
 use isomorph_model::TrainBackend;
 
 /// Adam's state for a network `M`.
-pub type AdamOf<M, B> = OptimizerAdaptor<Adam, M, B>;
+pub(crate) type AdamOf<M, B> = OptimizerAdaptor<Adam, M, B>;
 
 /// A new optimiser: Adam with betas 0.9 and 0.999 and epsilon 1e-8 (Kingma and Ba 2015).
-pub fn adam<B: TrainBackend, M: AutodiffModule<B>>() -> AdamOf<M, B> {
+pub(crate) fn adam<B: TrainBackend, M: AutodiffModule<B>>() -> AdamOf<M, B> {
     AdamConfig::new().with_epsilon(1e-8).init()
 }
 
@@ -21,7 +21,7 @@ pub fn adam<B: TrainBackend, M: AutodiffModule<B>>() -> AdamOf<M, B> {
 /// `clip = 0` never scales. The norm stays on the device: nothing is read back.
 ///
 /// A weight that no term of the step depends on has no gradient and stays as it is.
-pub fn advance<B: TrainBackend, M: AutodiffModule<B>>(
+pub(crate) fn advance<B: TrainBackend, M: AutodiffModule<B>>(
     optimiser: &mut AdamOf<M, B>,
     net: M,
     parts: Vec<GradientsParams>,

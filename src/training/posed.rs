@@ -86,7 +86,7 @@ impl Slopes {
 }
 
 /// The terms of the whole step: the means of those of its equal parts.
-pub fn mean_of(parts: &[Vec<TermReport>]) -> Vec<TermReport> {
+pub(crate) fn mean_of(parts: &[Vec<TermReport>]) -> Vec<TermReport> {
     let Some((first, others)) = parts.split_first() else {
         return Vec::new();
     };

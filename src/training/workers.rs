@@ -14,7 +14,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 /// Threads that take jobs.
 #[derive(Debug)]
-pub struct Workers {
+pub(crate) struct Workers {
     /// Pools of one thread: parallel iterators that a job calls, in burn and its matrix products too,
     /// find one thread there and stay on it.
     pools: Vec<ThreadPool>,
@@ -22,7 +22,7 @@ pub struct Workers {
 
 impl Workers {
     /// As many workers as rayon's own pool has threads (`RAYON_NUM_THREADS`, else the cores).
-    pub fn shared() -> &'static Self {
+    pub(crate) fn shared() -> &'static Self {
         static SHARED: OnceLock<Workers> = OnceLock::new();
         SHARED.get_or_init(|| Self::new(rayon::current_num_threads()))
     }
@@ -48,7 +48,7 @@ impl Workers {
     ///
     /// # Panics
     /// If a job does.
-    pub fn map<T: Send>(&self, count: usize, job: impl Fn(usize) -> T + Sync) -> Vec<T> {
+    pub(crate) fn map<T: Send>(&self, count: usize, job: impl Fn(usize) -> T + Sync) -> Vec<T> {
         let job = |k| without_denormals(|| job(k));
         if count < 2 || self.pools.len() < 2 {
             return (0..count).map(job).collect();

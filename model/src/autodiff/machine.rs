@@ -29,7 +29,7 @@ const DIVIDED: usize = 192 * 192 * 192;
 #[cfg(any(feature = "ndarray", feature = "flex"))]
 /// A matrix in memory.
 #[derive(Clone, Copy, Debug)]
-pub struct Matrix<'a> {
+pub(super) struct Matrix<'a> {
     elements: &'a [f32],
     rows: usize,
     columns: usize,
@@ -42,7 +42,7 @@ impl<'a> Matrix<'a> {
     ///
     /// # Panics
     /// If there are not `rows columns` of them.
-    pub fn by_rows(elements: &'a [f32], rows: usize, columns: usize) -> Self {
+    pub(super) fn by_rows(elements: &'a [f32], rows: usize, columns: usize) -> Self {
         assert_eq!(
             elements.len(),
             rows * columns,
@@ -60,7 +60,7 @@ impl<'a> Matrix<'a> {
     ///
     /// # Panics
     /// If there are not `rows columns` of them.
-    pub fn by_columns(elements: &'a [f32], rows: usize, columns: usize) -> Self {
+    pub(super) fn by_columns(elements: &'a [f32], rows: usize, columns: usize) -> Self {
         Self {
             by_columns: true,
             ..Self::by_rows(elements, rows, columns)
@@ -82,7 +82,7 @@ impl<'a> Matrix<'a> {
 ///
 /// # Panics
 /// If `a` has not as many columns as `b` has rows.
-pub fn product(a: Matrix<'_>, b: Matrix<'_>) -> Vec<f32> {
+pub(super) fn product(a: Matrix<'_>, b: Matrix<'_>) -> Vec<f32> {
     assert_eq!(
         a.columns, b.rows,
         "columns of the left matrix and rows of the right one"

@@ -41,7 +41,7 @@ struct Files {
 
 impl Files {
     fn prepare(&self) -> Result<Keyframes, ShapeError> {
-        let shapes = [&self.source, &self.target].map(|path| crate::shape::read(path));
+        let shapes = [&self.source, &self.target].map(|path| crate::formats::read(path));
         let [source, target] = shapes.map(|shape| shape.expect("a shape"));
         prepare(&[source, target], &self.options)
     }
@@ -220,7 +220,7 @@ fn a_cloud_is_used_as_it_is_with_its_own_normals_or_estimated_ones() {
     write_cloud(&files.source, &points, Some(&points));
     assert_eq!(files.prepared().notes.len(), 1);
     write_cloud(&files.source, &points, Some(&inward));
-    let outward = |cloud: &Cloud| {
+    let outward = |cloud: &PointCloud| {
         let normals = cloud.normals.as_ref().expect("normals");
         let pairs = cloud.points.iter().zip(normals);
         pairs
@@ -256,7 +256,7 @@ fn the_bounds_hold_every_point_of_both() {
 #[test]
 fn three_key_frames_have_pairs_between_each_two_and_samples_of_their_own() {
     let files = tetrahedra();
-    let shapes = [&files.source, &files.target, &files.source].map(|path| crate::shape::read(path));
+    let shapes = [&files.source, &files.target, &files.source].map(|path| crate::formats::read(path));
     let shapes = shapes.map(|shape| shape.expect("a shape"));
     let options = DataOptions {
         times: vec![0.0, 0.25, 1.0],

@@ -210,7 +210,7 @@ pub(super) struct Trainee<B: TrainBackend, M: AutodiffModule<B>> {
 
 impl<B: TrainBackend, M: AutodiffModule<B>> Trainee<B, M> {
     /// A network before its first step.
-    pub fn new(name: &'static str, net: M, device: &B::Device) -> Self {
+    pub(crate) fn new(name: &'static str, net: M, device: &B::Device) -> Self {
         let optimiser = optimiser::adam();
         Self {
             name,
@@ -222,29 +222,29 @@ impl<B: TrainBackend, M: AutodiffModule<B>> Trainee<B, M> {
 
     /// The network with a place of its own in the graph: graphs that share no node can be made and
     /// walked side by side.
-    pub fn replica(&self) -> M {
+    pub(crate) fn replica(&self) -> M {
         M::from_inner(self.net.valid())
     }
 
     /// One step of the optimiser against the sum of the parts' gradients; see [`optimiser::advance`].
-    pub fn advance(&mut self, parts: Vec<GradientsParams>, rate: f64, clip: f64) {
+    pub(crate) fn advance(&mut self, parts: Vec<GradientsParams>, rate: f64, clip: f64) {
         let net = self.net.clone();
         self.net = optimiser::advance(&mut self.optimiser, net, parts, rate, clip);
     }
 
     /// The network for values.
-    pub fn valid(&self) -> M::InnerModule {
+    pub(crate) fn valid(&self) -> M::InnerModule {
         self.net.valid()
     }
 
     /// Adds the records of network and optimiser.
-    pub fn record(&self, records: &mut Records) -> io::Result<()> {
+    pub(crate) fn record(&self, records: &mut Records) -> io::Result<()> {
         records.push::<B>(self.file(), self.net.clone().into_record())?;
         records.push::<B>(self.optimiser_file(), self.optimiser.to_record())
     }
 
     /// Takes both from records.
-    pub fn restore(&mut self, records: &Records) -> Result<(), RecordError> {
+    pub(crate) fn restore(&mut self, records: &Records) -> Result<(), RecordError> {
         let net = records.get::<B, M::Record>(&self.file(), &self.device)?;
         let state = records.get::<B, _>(&self.optimiser_file(), &self.device)?;
         self.net = self.net.clone().load_record(net);

@@ -55,13 +55,13 @@ macro_rules! with {
 
 /// What leaves the activation, of the shape of `z`, and its slope, `[n, c]`, from what enters it, `z`,
 /// `[blocks n, c]`, without the bias, `[c]`.
-pub fn jet(z: &[f32], bias: &[f32], lanes: Lanes, activation: Activation) -> (Vec<f32>, Vec<f32>) {
+pub(super) fn jet(z: &[f32], bias: &[f32], lanes: Lanes, activation: Activation) -> (Vec<f32>, Vec<f32>) {
     with!(activation, jet_of(z, bias, lanes))
 }
 
 /// The gradient by what entered [`jet`] from that by what left it, `out`, all `[blocks n, c]`; `z` may be
 /// empty where the value travels alone.
-pub fn jet_backward(
+pub(super) fn jet_backward(
     z: &[f32],
     out: &[f32],
     slope: &[f32],
@@ -74,7 +74,7 @@ pub fn jet_backward(
 
 /// The gradient by what entered the activation, from that by its slope; `out` is what left it, the values
 /// first.
-pub fn slope_backward(
+pub(super) fn slope_backward(
     out: &[f32],
     slope: &[f32],
     grad: &[f32],

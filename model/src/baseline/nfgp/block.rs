@@ -51,7 +51,7 @@ pub(super) struct Block<B: Backend> {
 
 impl<B: ModelBackend> Block<B> {
     /// A block near the identity, its parameters numbered from `first + 1`.
-    pub fn init(config: &NfgpConfig, first: u64, rng: &mut ChaCha8Rng, device: &B::Device) -> Self {
+    pub(super) fn init(config: &NfgpConfig, first: u64, rng: &mut ChaCha8Rng, device: &B::Device) -> Self {
         let parameter = |id: u64, values: Vec<f32>, shape: [usize; 2]| {
             let tensor = Tensor::from_data(TensorData::new(values, shape), device);
             // Numbered, so that a checkpoint depends on nothing but the seed.
@@ -82,7 +82,7 @@ impl<B: ModelBackend> Block<B> {
     }
 
     /// The values of `other` under this block's own parameter numbers.
-    pub fn with_weights_of(&self, other: &Self) -> Self {
+    pub(super) fn with_weights_of(&self, other: &Self) -> Self {
         let copy = |own: &Param<Tensor<B, 2>>, other: &Param<Tensor<B, 2>>| {
             Param::initialized(own.id, other.val().detach().require_grad())
         };
@@ -97,7 +97,7 @@ impl<B: ModelBackend> Block<B> {
     }
 
     /// `g` with its layers normalised, tracked by the weights.
-    pub fn residual(&self, config: &NfgpConfig) -> Residual<B> {
+    pub(super) fn residual(&self, config: &NfgpConfig) -> Residual<B> {
         let m = config.frequencies as f64;
         let layers = self.layers.iter().map(|layer| {
             let weight = layer.weight.val();
@@ -191,7 +191,7 @@ pub(super) struct Residual<B: Backend> {
 
 impl<B: ModelBackend> Residual<B> {
     /// `g(x)`, `[n, 3]` to `[n, 3]`.
-    pub fn value(&self, x: Tensor<B, 2>) -> Tensor<B, 2> {
+    pub(super) fn value(&self, x: Tensor<B, 2>) -> Tensor<B, 2> {
         let mut h = encode(x, self.frequencies);
         let last = self.layers.len() - 1;
         for (k, (weight, bias)) in self.layers.iter().enumerate() {
@@ -279,20 +279,20 @@ pub(super) struct Normalised<B: Backend> {
 }
 
 impl<B: ModelBackend> Normalised<B> {
-    pub fn new(residuals: impl Iterator<Item = Residual<B>>) -> Self {
+    pub(super) fn new(residuals: impl Iterator<Item = Residual<B>>) -> Self {
         Self {
             residuals: residuals.collect(),
         }
     }
 
     /// `D(x)`.
-    pub fn forward(&self, x: Tensor<B, 2>) -> Tensor<B, 2> {
+    pub(super) fn forward(&self, x: Tensor<B, 2>) -> Tensor<B, 2> {
         let blocks = self.residuals.iter();
         blocks.fold(x, |x, residual| x.clone() + residual.value(x))
     }
 
     /// `D(x)` and `J w` for each of `K` directions `w`, `[n, 3]` each.
-    pub fn jet<const K: usize>(
+    pub(super) fn jet<const K: usize>(
         &self,
         x: Tensor<B, 2>,
         directions: [Tensor<B, 2>; K],
@@ -309,7 +309,7 @@ impl<B: ModelBackend> Normalised<B> {
     }
 
     /// `D(x)` and the three columns of `J`, `[n, 3]` each.
-    pub fn jet_by_axes(&self, x: Tensor<B, 2>) -> (Tensor<B, 2>, [Tensor<B, 2>; 3]) {
+    pub(super) fn jet_by_axes(&self, x: Tensor<B, 2>) -> (Tensor<B, 2>, [Tensor<B, 2>; 3]) {
         let [n, _] = x.dims();
         let axis = |k: usize| {
             let mut unit = [0.0; 3];
@@ -324,7 +324,7 @@ impl<B: ModelBackend> Normalised<B> {
     }
 
     /// `D^-1(y)`, untracked.
-    pub fn inverse(&self, y: Tensor<B, 2>, until: FixedPoint) -> Tensor<B, 2> {
+    pub(super) fn inverse(&self, y: Tensor<B, 2>, until: FixedPoint) -> Tensor<B, 2> {
         let blocks = self.residuals.iter().rev();
         blocks.fold(y.detach(), |y, residual| {
             residual.detached().invert(y, until)
