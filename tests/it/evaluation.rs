@@ -382,11 +382,11 @@ fn only_a_run_with_a_checkpoint_can_be_measured() {
         let told = format!("{folder}: not a run");
         place
             .isomorph(&command(folder))
-            .refused(2, &[&told, "isomorph train"]);
+            .refused(2, &[&told, "name the folder"]);
     }
     fs::remove_dir_all(run.path("checkpoints")).expect("a folder");
     place
         .isomorph(&command("run"))
-        .refused(1, &["no checkpoint", "isomorph train"]);
+        .refused(1, &["no checkpoint"]);
     assert!(!run.path("evaluation.json").exists(), "numbers of nothing");
 }

@@ -135,7 +135,7 @@ fn every_command_has_help_that_names_its_defaults() {
             &["--aligned", "[default: pairs.csv]", "[default: 0.5]"],
         ),
         ("normals", &["--output", "all pointing out"]),
-        ("init", &["[default: none]", "[default: default]"]),
+        ("init", &["[default: none]", "[default: default]", "--all"]),
         ("info", &["recipe", "run"]),
         ("bench", &["--json"]),
     ];

@@ -3,6 +3,7 @@
 
 mod backends;
 mod bad_comparisons;
+mod bad_methods;
 mod bad_recipes;
 mod bad_runs;
 mod bad_shapes;
@@ -10,12 +11,16 @@ mod closed_forms;
 mod comparison;
 mod evaluation;
 mod extraction;
+mod front_door;
 mod golden;
 mod information;
+mod interruption;
 mod matching;
 mod methods;
 mod normals;
+mod old_runs;
 mod outputs;
 mod paper;
 mod resume;
+mod samples;
 mod support;

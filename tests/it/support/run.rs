@@ -59,11 +59,21 @@ impl Run {
         json(&self.newest().join("state.json"))
     }
 
-    /// Both networks of the newest checkpoint, as bytes. (The records of the optimisers hold the same
-    /// numbers in an order that differs from one process to the next.)
-    pub fn networks(&self) -> [Vec<u8>; 2] {
-        ["implicit.mpk", "velocity.mpk"]
-            .map(|name| fs::read(self.newest().join(name)).expect("a record"))
+    /// The networks of the newest checkpoint as bytes, by the names of their files: `ends.mpk` and
+    /// `velocity.mpk` of the flow, `implicit.mpk` and `velocity.mpk` of the paper's geometry. (The records of
+    /// the optimisers hold the same numbers in an order that differs from one process to the next.)
+    pub fn networks(&self) -> BTreeMap<String, Vec<u8>> {
+        let newest = self.newest();
+        let is_network = |name: &String| name.ends_with(".mpk") && !name.contains("optimiser");
+        let files = names(&newest).into_iter().filter(is_network);
+        let networks: BTreeMap<_, _> = files
+            .map(|name| {
+                let record = fs::read(newest.join(&name)).expect("a record");
+                (name, record)
+            })
+            .collect();
+        assert!(!networks.is_empty(), "{}: no network", newest.display());
+        networks
     }
 
     /// `metrics.jsonl`.

@@ -18,7 +18,8 @@ impl Workplace {
     }
 
     /// One with `source.ply`, `target.ply` and `recipe.toml`: the two shapes, equal in their vertices,
-    /// and `preset = "quick"` with [`NETWORK`] and more keys, each as in `training.steps=20`.
+    /// and `preset = "quick"` with keys, each as in `training.steps=20`. Of keys that are given twice the
+    /// last one counts.
     pub fn with_pair(source: &Mesh, target: &Mesh, keys: &[&str]) -> Self {
         let place = Self::new();
         place.write("source.ply", ply::text(source));
@@ -30,21 +31,28 @@ impl Workplace {
             recipe.push_str("data.correspondences = \"same-vertices\"\n");
         }
         let name = |key: &str| key.split([' ', '=']).next().map(str::to_owned);
-        let given = |key: &str| keys.iter().any(|other| name(other) == name(key));
-        let network = NETWORK.iter().filter(|key| !given(key));
-        for key in network.chain(keys) {
-            recipe.push_str(key);
-            recipe.push('\n');
+        for (at, key) in keys.iter().enumerate() {
+            if keys[at + 1..].iter().all(|later| name(later) != name(key)) {
+                recipe.push_str(key);
+                recipe.push('\n');
+            }
         }
         place.write("recipe.toml", &recipe);
         place
     }
 
-    /// A small sphere that moves by its radius and learns in milliseconds per step.
+    /// A small sphere that moves by its radius and learns in milliseconds per step, with the preset `quick`
+    /// as it ships, only smaller.
     pub fn tiny(keys: &[&str]) -> Self {
+        Self::tiny_with(TINY, keys)
+    }
+
+    /// The same with other sizes: a method other than the default one has other networks, and a recipe holds
+    /// no key that does nothing.
+    pub fn tiny_with(sizes: &[&str], keys: &[&str]) -> Self {
         let sphere = Mesh::sphere(1.0, 3);
         let target = sphere.clone().map(|x| [x[0] + 1.0, x[1], x[2]]);
-        Self::with_pair(&sphere, &target, &[TINY, keys].concat())
+        Self::with_pair(&sphere, &target, &[sizes, keys].concat())
     }
 
     /// The path of a file in it.
@@ -105,9 +113,12 @@ impl Workplace {
     }
 }
 
-/// The paper's geometry, on which most tests were made: one network `f(x, t)` of softplus with all phases of
-/// training, and a stationary `V`. Keys that a test gives itself go before these.
-const NETWORK: &[&str] = &[
+/// The product as it ships: `quick` with nothing changed.
+pub const SHIPPED: &[&str] = &[];
+
+/// The paper's geometry, a second column beside [`SHIPPED`]: one network `f(x, t)` of softplus with all phases
+/// of training, and a stationary `V`. A test puts these before its own keys.
+pub const NETWORK: &[&str] = &[
     "implicit.geometry = \"network\"",
     "implicit.activation = \"softplus\"",
     "implicit.beta = 100",
@@ -119,7 +130,10 @@ const NETWORK: &[&str] = &[
     "training.time-steps = 3",
 ];
 
-/// Keys with which a step takes milliseconds.
+/// Both, with their names.
+pub const COLUMNS: [(&str, &[&str]); 2] = [("shipped", SHIPPED), ("network", NETWORK)];
+
+/// Sizes with which a step takes milliseconds; all of them act in both columns.
 const TINY: &[&str] = &[
     "implicit.depth = 3",
     "implicit.width = 32",
