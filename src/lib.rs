@@ -5,7 +5,7 @@
 //! use isomorph::{Backend, Recipe, Session};
 //!
 //! # fn main() -> Result<(), isomorph::Error> {
-//! let recipe = Recipe::between("a.ply".as_ref(), "b.ply".as_ref())?;
+//! let recipe = Recipe::between("a.ply", "b.ply")?;
 //! let mut session = Session::prepare(recipe, "runs/pair", Backend::Flex)?;
 //! let trained = session.train(|event| println!("{event}"))?;
 //! let half_way = trained.surface(0.5, 192)?;

@@ -27,6 +27,10 @@ pub(super) struct InitArgs {
     /// The values that keys left out fall back to: quick, default, quality or paper
     #[arg(long, default_value = "default")]
     preset: String,
+
+    /// Print the keys of all methods, each with the methods in which it acts
+    #[arg(long)]
+    all: bool,
 }
 
 pub(super) fn run(args: InitArgs) -> Result {
@@ -46,6 +50,6 @@ pub(super) fn run(args: InitArgs) -> Result {
         "match" => Correspondences::Match,
         file => Correspondences::File(PathBuf::from(file)),
     };
-    let text = Recipe::commented(&args.source, &args.target, &correspondences, preset);
+    let text = Recipe::commented(&args.source, &args.target, &correspondences, preset, args.all);
     print(&text.map_err(isomorph::Error::from)?)
 }

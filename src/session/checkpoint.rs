@@ -163,11 +163,9 @@ impl Checkpoint {
     /// # Errors
     /// [`CheckpointError::Recipe`] if it no longer parses.
     pub fn recipe(&self) -> Result<Recipe, CheckpointError> {
-        Ok(Recipe::parse(
-            &self.state.recipe,
-            &self.path.join("recipe.toml"),
-            &[],
-        )?)
+        let origin = self.path.join("recipe.toml");
+        let (recipe, _) = Recipe::parse_stored(&self.state.recipe, &origin)?;
+        Ok(recipe)
     }
 
     /// Networks and optimiser states, each file checked against its digest.

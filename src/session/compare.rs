@@ -9,6 +9,7 @@
 use std::path::PathBuf;
 
 use isomorph_training::engine::Engine;
+use isomorph_training::method::METHODS;
 
 use super::compared::{Made, make, stored_pairs};
 use super::evaluate::{EvaluateOptions, true_frame};
@@ -26,7 +27,7 @@ use crate::evaluate::{GroundTruth, Reference, Span};
 use crate::event::Event;
 use crate::formats::{SurfaceFormat, write_surface};
 use crate::geometry::Mesh;
-use crate::recipe::{Preset, Recipe};
+use crate::recipe::{Preset, Recipe, RecipeError};
 use crate::shape::Normalisation;
 
 /// What to compare.
@@ -54,34 +55,11 @@ pub struct CompareOptions {
     pub command: String,
 }
 
-/// Softplus networks, as the sources of these methods have them or leave open: sines would give a plain
-/// network between its ends the freedom to dissolve.
-const SOFT: [&str; 3] = [
-    "implicit.activation=softplus",
-    "implicit.beta=100",
-    "training.learning-rate=2e-3",
-];
-
-/// The methods that are not presets, each with what it changes in `quick`.
-const OTHERS: [(&str, &[&str]); 7] = [
-    ("mlp", &SOFT),
-    ("sdf-blend", &SOFT),
-    ("lipmlp", &["training.learning-rate=2e-3"]),
-    // Sines learn faster: at 2e-3 their fields fray.
-    ("nise", &["training.learning-rate=5e-4"]),
-    ("nise-velocity", &["training.learning-rate=5e-4"]),
-    // Coefficients of one size each: the steps can be larger than a network's.
-    ("eigenbasis", &["training.velocity-learning-rate=1e-2"]),
-    // Its normalised layers learn slowly.
-    ("nfgp", &["training.velocity-learning-rate=3e-3"]),
-];
-
 /// The methods that can be compared: presets and names of methods.
 pub fn known() -> Vec<&'static str> {
+    let baselines = METHODS.iter().filter(|spec| spec.is_baseline);
     let presets = Preset::WORDS.iter().copied();
-    presets
-        .chain(OTHERS.iter().map(|(name, _)| *name))
-        .collect()
+    presets.chain(baselines.map(|spec| spec.name)).collect()
 }
 
 /// Compares methods on pairs of frames and leaves tables, figures and numbers in the output folder, renewed
@@ -158,30 +136,67 @@ impl Bench<'_> {
                 )));
             }
         }
+        self.shared_changes(plan)?;
         for method in &plan.methods {
             self.recipe(method, plan.pairs[0])?;
         }
         Ok(())
     }
 
-    /// The recipe of a method on a pair.
+    /// The recipe of a method on a pair. A change that all methods share counts where it acts.
     fn recipe(&self, method: &MethodPlan, pair: FramePair) -> Result<Recipe> {
+        let acts = |change: &&String| {
+            let alone = self.parsed(method, pair, std::slice::from_ref(*change));
+            Ok::<_, Error>(!matches!(alone?, Err(RecipeError::Idle { .. })))
+        };
+        let mut changes = Vec::new();
+        for change in &self.options.changes {
+            if acts(&change)? {
+                changes.push(change.clone());
+            }
+        }
+        let recipe = self.parsed(method, pair, &changes)?.map_err(Error::from);
+        recipe.map_err(|error| error.within(&format!("method {}", method.label)))
+    }
+
+    /// The recipe of a method on a pair with these changes beside its own.
+    fn parsed(
+        &self,
+        method: &MethodPlan,
+        pair: FramePair,
+        changes: &[String],
+    ) -> Result<std::result::Result<Recipe, RecipeError>> {
         let preset = Preset::from_word(&method.method).unwrap_or(Preset::Quick);
         let text = format!(
             "preset = \"{preset}\"\n[data]\nsource = \"source.ply\"\ntarget = \"target.ply\"\n\
              correspondences = \"same-vertices\"\n[result]\nframes = 0\n"
         );
-        let own = OTHERS.iter().find(|(name, _)| *name == method.method);
-        let own = own.map_or_else(Vec::new, |(name, changes)| {
-            let name = format!("method.name={name}");
-            let changes = changes.iter().map(|change| (*change).to_owned());
-            std::iter::once(name).chain(changes).collect()
-        });
-        let set = &self.options.changes;
-        let overrides: Vec<String> = [&own, set, &method.overrides].map(Vec::clone).concat();
+        let own = METHODS.iter().find(|spec| spec.name == method.method);
+        let own = own.map_or_else(Vec::new, |spec| spec.compare_overrides());
         let path = std::path::absolute(self.folder(pair))?.join("recipe.toml");
-        let recipe = Recipe::parse(&text, &path, &overrides).map_err(Error::from);
-        recipe.map_err(|error| error.within(&format!("method {}", method.label)))
+        let overrides = [&own[..], changes, &method.overrides].concat();
+        Ok(Recipe::parse(&text, &path, &overrides))
+    }
+
+    /// Whether each change that all methods share acts in at least one of them.
+    fn shared_changes(&self, plan: &Plan) -> Result<()> {
+        let pair = plan.pairs[0];
+        for change in &self.options.changes {
+            let mut idle = None;
+            for method in &plan.methods {
+                match self.parsed(method, pair, std::slice::from_ref(change))? {
+                    Err(error @ RecipeError::Idle { .. }) => idle = Some(error),
+                    _ => {
+                        idle = None;
+                        break;
+                    }
+                }
+            }
+            if let Some(error) = idle {
+                return Err(error.into());
+            }
+        }
+        Ok(())
     }
 
     /// Where a pair's shapes and runs are.
@@ -341,19 +356,15 @@ struct Truth {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::recipe::MethodName;
 
     #[test]
-    fn every_method_of_the_recipe_can_be_compared() {
-        for name in MethodName::WORDS {
-            let known = known();
-            assert!(
-                *name == "velocity-field" || known.contains(name),
-                "{name}: {known:?}"
-            );
+    fn every_method_and_every_preset_can_be_compared() {
+        let known = known();
+        for spec in METHODS.iter().filter(|spec| spec.is_baseline) {
+            assert!(known.contains(&spec.name), "{}: {known:?}", spec.name);
         }
         for preset in Preset::WORDS {
-            assert!(known().contains(preset), "{preset}");
+            assert!(known.contains(preset), "{preset}");
         }
     }
 }

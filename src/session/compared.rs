@@ -25,7 +25,8 @@ pub fn stored_pairs(path: &Path, recipe: &Recipe) -> Option<PathBuf> {
 }
 
 fn is_of(run: &RunFolder, recipe: &Recipe) -> bool {
-    Recipe::read(&run.recipe(), &[]).is_ok_and(|before| before == *recipe)
+    run.stored_recipe()
+        .is_ok_and(|(before, _)| before == *recipe)
 }
 
 /// The run in a folder if it was made with this recipe, with its newest checkpoint; else a new one.

@@ -3,10 +3,12 @@
 use std::fmt::Write;
 use std::path::Path;
 
+use isomorph_training::method::spec_of;
+
 use super::checkpoint::{self, Checkpoint};
 use super::folder::RunFolder;
 use crate::error::{Error, Result};
-use crate::recipe::{MethodName, Recipe};
+use crate::recipe::Recipe;
 use crate::formats::{self, Sequence, Shape};
 use crate::geometry::EdgeSharing;
 
@@ -95,11 +97,12 @@ fn run_info(path: &Path) -> Result<String> {
     )?;
     writeln!(text, "seconds      {:.1}", state.seconds)?;
     writeln!(text, "backend      {}", state.backend)?;
-    writeln!(text, "method       {}", recipe.method.name)?;
+    let spec = spec_of(&recipe);
+    writeln!(text, "method       {}", spec.described())?;
     writeln!(text, "preset       {}", recipe.preset)?;
-    writeln!(text, "source       {}", recipe.data.source.display())?;
-    writeln!(text, "target       {}", recipe.data.target.display())?;
-    if recipe.method.name == MethodName::VelocityField {
+    writeln!(text, "source       {}", recipe.data.source().display())?;
+    writeln!(text, "target       {}", recipe.data.target().display())?;
+    if !spec.is_baseline {
         let (f, v) = (&recipe.implicit, &recipe.velocity);
         writeln!(
             text,

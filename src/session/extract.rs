@@ -90,7 +90,7 @@ impl Trained {
             times: options.times.clone(),
             resolution: options.resolution,
             format: options.format,
-            carry: options.carry.then(|| self.recipe().data.source.clone()),
+            carry: options.carry.then(|| self.recipe().data.source().to_owned()),
             smallest_component: options.smallest_component,
             folder: folder.unwrap_or_else(|| self.folder().meshes()),
         };

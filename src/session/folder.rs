@@ -9,6 +9,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use crate::atomic;
+use crate::error::Result;
+use crate::recipe::{Recipe, RecipeError};
 
 /// Why a run's folder cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -50,7 +52,7 @@ impl RunFolder {
     ///
     /// # Errors
     /// [`FolderError`]; with `replace` an older run there is deleted first, and nothing but a run ever is.
-    pub fn create(path: &Path, recipe: &str, replace: bool) -> Result<Self, FolderError> {
+    pub fn create(path: &Path, recipe: &str, replace: bool) -> std::result::Result<Self, FolderError> {
         let io = |reason| FolderError::Io {
             path: path.to_path_buf(),
             reason,
@@ -80,13 +82,25 @@ impl RunFolder {
     ///
     /// # Errors
     /// [`FolderError::Missing`] if it holds no recipe.
-    pub fn open(path: &Path) -> Result<Self, FolderError> {
+    pub fn open(path: &Path) -> std::result::Result<Self, FolderError> {
         let run = Self(path.to_path_buf());
         if run.recipe().is_file() {
             Ok(run)
         } else {
             Err(FolderError::Missing(path.to_path_buf()))
         }
+    }
+
+    /// The recipe of the run, of this version or an earlier one, with notes on what this version leaves out
+    /// of it.
+    ///
+    /// # Errors
+    /// What [`Recipe::parse_stored`] refuses, or the file system.
+    pub fn stored_recipe(&self) -> Result<(Recipe, Vec<String>)> {
+        let path = self.recipe();
+        let text = fs::read_to_string(&path)
+            .map_err(|reason| RecipeError::Unreadable { path: path.clone(), reason })?;
+        Ok(Recipe::parse_stored(&text, &path)?)
     }
 
     /// The folder itself.

@@ -2,10 +2,11 @@
 
 use isomorph_training::deformation::Deformation;
 use isomorph_training::engine::Engine;
+use isomorph_training::method::spec_of;
 
 use super::checkpoint::Checkpoint;
 use crate::error::{Error, Result};
-use crate::recipe::{MethodName, Recipe};
+use crate::recipe::Recipe;
 use crate::formats;
 use crate::geometry::{Bounds, Mesh};
 use crate::shape::Normalisation;
@@ -44,10 +45,7 @@ pub fn learned(
 /// # Errors
 /// If the method carries the source's mesh and it is a cloud.
 pub fn check(recipe: &Recipe, normalisation: &Normalisation) -> Result<()> {
-    if matches!(
-        recipe.method.name,
-        MethodName::Eigenbasis | MethodName::Nfgp
-    ) {
+    if spec_of(recipe).needs.mesh {
         template(recipe, normalisation)?;
     }
     Ok(())
@@ -55,7 +53,7 @@ pub fn check(recipe: &Recipe, normalisation: &Normalisation) -> Result<()> {
 
 /// The source's own mesh, normalised.
 fn template(recipe: &Recipe, normalisation: &Normalisation) -> Result<Mesh<f32>> {
-    let source = formats::read(&recipe.data.source)?;
+    let source = formats::read(recipe.data.source())?;
     if !source.is_mesh() {
         return Err(Error::usage(format!(
             "{}: a point cloud: the method {} gives no surface of its own and carries the source's \

@@ -12,7 +12,7 @@ use isomorph_training::records::BURN_VERSION;
 use super::checkpoint::{self, Checkpoint, CheckpointError, State};
 use crate::event::{Event, StepReport, TermReport};
 use crate::memory;
-use crate::recipe::{Change, MethodName, Recipe};
+use crate::recipe::{Change, Recipe};
 use crate::shape::{Keyframes, Normalisation};
 
 /// Why training stopped before its last step.
@@ -46,7 +46,7 @@ pub enum LearnerError {
         /// What differs.
         change: Change,
         /// Why it may not.
-        why: String,
+        why: &'static str,
     },
     /// The shapes are not those of the checkpoint.
     #[error(
@@ -301,7 +301,7 @@ pub fn fits(
     recipe: &Recipe,
     keyframes: &Keyframes,
 ) -> Result<(), LearnerError> {
-    if let Some((change, why)) = fixed_change(&checkpoint.recipe()?, recipe) {
+    if let Some((change, why)) = method::fixed_change(&checkpoint.recipe()?, recipe) {
         let path = checkpoint.path.clone();
         return Err(LearnerError::OtherNetworks { path, change, why });
     }
@@ -309,26 +309,6 @@ pub fn fits(
         return Err(LearnerError::OtherShapes(checkpoint.path.clone()));
     }
     Ok(())
-}
-
-/// The first change that a run cannot take once it has begun, and why: one of its networks, or of the
-/// number of steps where the method shares them out among what it trains one after the other.
-fn fixed_change(before: &Recipe, after: &Recipe) -> Option<(Change, String)> {
-    let name = before.method.name;
-    let shares_steps = matches!(
-        name,
-        MethodName::Nise | MethodName::NiseVelocity | MethodName::Nfgp
-    );
-    let is_fixed = |change: &Change| {
-        change.is_of_a_network() || (shares_steps && change.key == "training.steps")
-    };
-    let change = before.changes(after).into_iter().find(is_fixed)?;
-    let why = if change.is_of_a_network() {
-        "a trained network cannot change its shape".to_owned()
-    } else {
-        format!("{name} shares its steps out, so their number is fixed")
-    };
-    Some((change, why))
 }
 
 #[cfg(test)]

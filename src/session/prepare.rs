@@ -24,8 +24,11 @@ pub struct Prepared {
 /// # Errors
 /// What [`formats::read`] refuses.
 pub fn read(recipe: &Recipe) -> Result<Vec<Shape>> {
-    let files = [&recipe.data.source, &recipe.data.target];
-    let shapes = files.into_iter().map(|path| formats::read(path));
+    let shapes = recipe
+        .data
+        .keyframes
+        .iter()
+        .map(|key| formats::read(&key.file));
     Ok(shapes.collect::<std::result::Result<_, _>>()?)
 }
 
@@ -40,20 +43,25 @@ pub fn prepare(
     stored: Option<&Path>,
     emit: &mut dyn FnMut(&Event),
 ) -> Result<Prepared> {
-    let (source, found) = match &recipe.data.correspondences {
-        recipe::Correspondences::None => (CorrespondenceSource::None, None),
-        recipe::Correspondences::SameVertices => (CorrespondenceSource::SameVertices, None),
-        recipe::Correspondences::File(path) => (CorrespondenceSource::File(path.clone()), None),
-        recipe::Correspondences::Match => {
-            let (known, found) = matched(recipe, shapes, stored, emit)?;
-            (CorrespondenceSource::Pairs(known), found)
-        }
-    };
-    let keyframes = shape::prepare(shapes, &options(recipe, source))?;
+    let mut between = Vec::with_capacity(recipe.data.between.len());
+    let mut found = None;
+    for (known, shapes) in recipe.data.between.iter().zip(shapes.windows(2)) {
+        between.push(match known {
+            recipe::Correspondences::None => CorrespondenceSource::None,
+            recipe::Correspondences::SameVertices => CorrespondenceSource::SameVertices,
+            recipe::Correspondences::File(path) => CorrespondenceSource::File(path.clone()),
+            recipe::Correspondences::Match => {
+                let (known, matching) = matched(recipe, shapes, stored, emit)?;
+                found = matching;
+                CorrespondenceSource::Pairs(known)
+            }
+        });
+    }
+    let keyframes = shape::prepare(shapes, &options(recipe, between))?;
     Ok(Prepared { keyframes, found })
 }
 
-/// The pairs of the first two shapes: those of an earlier search if they are there, else found now.
+/// The pairs of two shapes: those of an earlier search if they are there, else found now.
 fn matched(
     recipe: &Recipe,
     shapes: &[Shape],
@@ -80,18 +88,17 @@ fn matched(
 /// What [`shape::prepare`] refuses.
 pub fn points_only(recipe: &Recipe) -> Result<Keyframes> {
     let shapes = read(recipe)?;
-    Ok(shape::prepare(
-        &shapes,
-        &options(recipe, CorrespondenceSource::None),
-    )?)
+    let unknown = recipe.data.between.iter();
+    let unknown = unknown.map(|_| CorrespondenceSource::None).collect();
+    Ok(shape::prepare(&shapes, &options(recipe, unknown))?)
 }
 
 /// What a recipe says of its shapes.
-fn options(recipe: &Recipe, pairs: CorrespondenceSource) -> DataOptions {
+fn options(recipe: &Recipe, between: Vec<CorrespondenceSource>) -> DataOptions {
     let section = &recipe.data;
     DataOptions {
-        times: vec![0.0, 1.0],
-        between: vec![pairs],
+        times: times(recipe),
+        between,
         points: section.points,
         correspondence_fraction: section.correspondence_fraction,
         normals: match section.normals {
@@ -102,6 +109,16 @@ fn options(recipe: &Recipe, pairs: CorrespondenceSource) -> DataOptions {
         },
         seed: recipe.training.seed,
     }
+}
+
+/// The times of the key frames, brought to 0 to 1.
+fn times(recipe: &Recipe) -> Vec<f64> {
+    let times: Vec<f64> = recipe.data.keyframes.iter().map(|key| key.time).collect();
+    let (first, last) = (times[0], times[times.len() - 1]);
+    times
+        .iter()
+        .map(|time| (time - first) / (last - first))
+        .collect()
 }
 
 impl Prepared {

@@ -42,10 +42,10 @@ use crate::formats::Shape;
 /// # sphere(0.5).write(&b)?;
 /// let mut recipe = Recipe::between(&a, &b)?;
 /// for key in ["preset=quick", "data.correspondences=same-vertices", "result.frames=0"] {
-///     recipe = recipe.with(key)?;
+///     recipe.with(key)?;
 /// }
 /// # for key in ["training.steps=4", "training.batch=100", "implicit.width=8", "velocity.width=8"] {
-/// #     recipe = recipe.with(key)?;
+/// #     recipe.with(key)?;
 /// # }
 /// let mut session = Session::prepare(recipe, place.path().join("run"), Backend::Flex)?;
 /// let trained = session.train(|event| eprintln!("{event}"))?;
@@ -76,6 +76,8 @@ enum Start {
         checkpoint: Option<Box<Checkpoint>>,
         /// Whether the run's recipe is written anew.
         rewrite: bool,
+        /// What this version leaves out of the recipe of an earlier one.
+        notes: Vec<String>,
     },
 }
 
@@ -103,7 +105,8 @@ impl Session {
     /// A folder that is no run, a damaged checkpoint, a change that the checkpoint does not fit.
     pub fn resume(folder: impl AsRef<Path>, changes: &[String], backend: Backend) -> Result<Self> {
         let run = RunFolder::open(folder.as_ref())?;
-        let recipe = Recipe::read(&run.recipe(), changes)?;
+        let (mut recipe, notes) = run.stored_recipe()?;
+        recipe.with_all(changes)?;
         let checkpoint = match Checkpoint::newest(&run.checkpoints()) {
             Ok(checkpoint) => Some(Box::new(checkpoint)),
             // Stopped before its first checkpoint: it starts again, with the same seed.
@@ -118,6 +121,7 @@ impl Session {
             start: Start::GoOn {
                 checkpoint,
                 rewrite: !changes.is_empty(),
+                notes,
             },
             stop: StopFlag::default(),
         })
@@ -176,6 +180,7 @@ impl Session {
         self.start = Start::GoOn {
             checkpoint: Checkpoint::newest(&run.checkpoints()).ok().map(Box::new),
             rewrite: false,
+            notes: Vec::new(),
         };
         if outcome == Outcome::Interrupted {
             return Err(Error::interruption(format!(
@@ -214,6 +219,7 @@ impl Session {
         let Start::GoOn {
             checkpoint,
             rewrite,
+            notes,
         } = &self.start
         else {
             unreachable!("a run that goes on");
@@ -232,6 +238,7 @@ impl Session {
         let step = checkpoint.as_ref().map_or(0, |found| found.state.step);
         let mut log = RunLog::open(run.path(), Some(step))?;
         let mut events: Vec<Event> = prepared.keep(&run)?.into_iter().collect();
+        events.extend(notes.iter().cloned().map(Event::Note));
         if checkpoint.is_none() {
             let note = "no checkpoint yet: the run starts again from its first step";
             events.push(Event::Note(note.to_owned()));

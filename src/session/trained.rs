@@ -29,11 +29,11 @@ use crate::surface::learned::Learned;
 /// #         let (ring, angle) = ((1.0 - z * z).sqrt(), 2.399_963 * k as f64);
 /// #         [x + ring * angle.cos(), ring * angle.sin(), z]
 /// #     });
-/// #     Shape::cloud(points.collect()).write(&place.path().join(name))?;
+/// #     Shape::cloud(points.collect()).write(place.path().join(name))?;
 /// # }
-/// # let mut recipe = Recipe::between(&place.path().join("a.ply"), &place.path().join("b.ply"))?;
+/// # let mut recipe = Recipe::between(place.path().join("a.ply"), place.path().join("b.ply"))?;
 /// # for key in ["preset=quick", "training.steps=2", "training.batch=100", "implicit.width=8", "result.frames=0"] {
-/// #     recipe = recipe.with(key)?;
+/// #     recipe.with(key)?;
 /// # }
 /// # let folder = place.path().join("run");
 /// # Session::prepare(recipe, &folder, Backend::Flex)?.train(|_| {})?;

@@ -17,9 +17,9 @@ use isomorph_model::flow::end_terms::EndSamples;
 use isomorph_model::loss::data;
 use isomorph_model::{ImplicitNet, Objective, TrainBackend};
 
-use crate::samples::Batch;
-use crate::report::Phase;
 use crate::motion::{Motion, has_priors};
+use crate::report::Phase;
+use crate::samples::Batch;
 use crate::settings::end_weights;
 
 /// What one step is made from.
@@ -54,11 +54,7 @@ impl<B: TrainBackend> FlowStep<'_, B> {
     fn motion_terms(&self, batch: &Batch, objective: &mut Objective<B>) {
         let loss = &self.motion.settings.loss;
         let weight = self.ramp * loss.on_surface;
-        let goals = if weight > 0.0 {
-            &batch.goals[..]
-        } else {
-            &[]
-        };
+        let goals = if weight > 0.0 { &batch.goals[..] } else { &[] };
         let matching = if self.warms_up {
             loss.matching_warm_up
         } else {
@@ -69,7 +65,7 @@ impl<B: TrainBackend> FlowStep<'_, B> {
             objective.add("on-surface", weight, || self.distance(arrived));
         }
         if has_priors(loss) {
-            let still = self.motion.carry_constants(batch, loss.stretch > 0.0);
+            let still = self.motion.carry_constants(batch, false);
             let at = self.motion.collocation(batch, &still);
             self.motion.priors(&at, false, objective);
         }

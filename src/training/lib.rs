@@ -23,6 +23,7 @@
 //! | `deformation.rs` | the border to what was trained: values and motion of points on the host |
 //! | `report.rs` | phases and terms, as they are reported |
 //! | `flop.rs` | what a step costs |
+//! | `spheres.rs` | key frames that need no file: for measuring and testing |
 //! | `workers.rs`, `tensors.rs` | cores, and tensors from and to the host |
 //!
 //! Nothing here knows a file, a clock or a terminal.

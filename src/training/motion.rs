@@ -44,8 +44,6 @@ pub struct Collocation<B: TrainBackend> {
     pub t: Tensor<B, 2>,
     /// How many of them are the band.
     pub band: usize,
-    /// The normals of the carried points that the band lies around, `[band, 3]`, if they are known.
-    pub normals: Option<Tensor<B, 2>>,
 }
 
 /// Whether the batch has a normal at every point that is carried.
@@ -128,11 +126,9 @@ impl<B: TrainBackend> Motion<'_, B> {
         };
         let mut x = Vec::new();
         let mut t = Vec::new();
-        let mut normals = None;
         if band > 0 {
             x.push(around(still.positions.clone()) + self.rows(&batch.offsets));
             t.push(around(column(&batch.stops, self.device)));
-            normals = still.normals.clone().map(around);
         }
         if !batch.uniform.points.is_empty() {
             x.push(self.rows(&batch.uniform.points));
@@ -142,7 +138,6 @@ impl<B: TrainBackend> Motion<'_, B> {
             x: Tensor::cat(x, 0),
             t: Tensor::cat(t, 0),
             band,
-            normals,
         }
     }
 
@@ -171,13 +166,13 @@ impl<B: TrainBackend> Motion<'_, B> {
             divergence::divergence(&jet)
         });
         if at.band > 0 {
-            self.band_priors(&jet.first(at.band), at, objective);
+            self.band_priors(&jet.first(at.band), objective);
         }
         Some(jet)
     }
 
     /// The priors that hold near the surface only.
-    fn band_priors(&self, jet: &VelocityJet<B>, at: &Collocation<B>, objective: &mut Objective<B>) {
+    fn band_priors(&self, jet: &VelocityJet<B>, objective: &mut Objective<B>) {
         let loss = &self.settings.loss;
         objective.add("strain", loss.strain, || {
             strain::strain(jet, loss.strain_scale)
@@ -201,22 +196,13 @@ impl<B: TrainBackend> Motion<'_, B> {
 
 /// Whether any term is made of the jet of `V` alone.
 pub fn has_priors(loss: &LossRecipe) -> bool {
-    let weights = [
-        loss.smoothness,
-        loss.divergence,
-        loss.strain,
-        loss.deviatoric,
-        loss.stretch,
-        loss.steadiness,
-        loss.screw,
-        loss.acceleration,
-    ];
+    let weights = [loss.smoothness, loss.divergence, loss.strain, loss.screw];
     weights.iter().any(|weight| *weight > 0.0)
 }
 
 /// Whether any term is made of `dV/dt`.
 pub fn needs_rate(loss: &LossRecipe) -> bool {
-    loss.steadiness > 0.0 || loss.screw > 0.0 || loss.acceleration > 0.0
+    loss.screw > 0.0
 }
 
 /// A jet of the inner backend as constants of the training backend.

@@ -11,10 +11,10 @@ use isomorph_model::loss::{data, eikonal, level_set, normals, off_surface};
 use isomorph_model::operators::{Operators, VelocityJet};
 use isomorph_model::{ImplicitNet, Objective, TrainBackend};
 
-use crate::samples::Batch;
-use crate::report::Phase;
 use crate::motion::{Collocation, Motion, Still, has_normals};
 use crate::recipe::LevelSetForm;
+use crate::report::Phase;
+use crate::samples::Batch;
 use crate::tensors::{column, rows};
 
 /// What one step is made from.
@@ -67,7 +67,7 @@ impl<B: TrainBackend> Step<'_, B> {
                 .carry_tracked(batch, &batch.stops, loss.matching, objective),
         };
         let for_f = self.phase != Phase::WarmUp && loss.transported_normals > 0.0;
-        let normals = has_normals(batch) && (for_f || loss.stretch > 0.0);
+        let normals = has_normals(batch) && for_f;
         let still = match &tracked {
             Some(positions) if !normals => Still {
                 positions: positions.clone().inner(),

@@ -1,7 +1,6 @@
 //! Phases, ramps and learning rates: pure functions of the step, so that a resumed run continues on the
 //! same curve.
 
-
 use crate::recipe::{Schedule as Fall, TrainingRecipe};
 use crate::report::Phase;
 

@@ -38,19 +38,12 @@ impl Settings {
             implicit: implicit(recipe),
             velocity: velocity(recipe),
             loss: recipe.loss.clone(),
-            derivatives: match training.derivatives {
-                recipe::Derivatives::Nested => Derivatives::Nested,
-                recipe::Derivatives::Forward => Derivatives::Forward,
-            },
+            derivatives: training.derivatives,
             steps: match training.times {
                 recipe::TimeSampling::Random => Steps::Even(training.time_steps),
                 recipe::TimeSampling::Grid => Steps::Grid(training.time_steps),
             },
-            integrator: match training.integrator {
-                recipe::Integrator::Euler => Integrator::Euler,
-                recipe::Integrator::Midpoint => Integrator::Midpoint,
-                recipe::Integrator::Rk4 => Integrator::Rk4,
-            },
+            integrator: training.integrator,
             training,
         }
     }

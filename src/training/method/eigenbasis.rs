@@ -8,15 +8,64 @@ use isomorph_model::baseline::eigenbasis::{Eigenbasis, EigenbasisConfig, Eigenba
 use isomorph_model::trajectory::{Integrator, Steps};
 use isomorph_model::{Geometry, Motion, TrainBackend};
 
+use super::spec::{Acts, Keys, MethodSpec, Needs};
 use super::{Method, Trainee};
-use crate::posed::{Posed, Slopes};
-use crate::schedule::Schedule;
-use crate::recipe::{Recipe, TrainingRecipe};
 use crate::data::{Bounds, TrainingData};
+use crate::posed::{Posed, Slopes};
+use crate::recipe::rule::Rule;
+use crate::recipe::schema::{Keyed, section};
+use crate::recipe::{Recipe, TrainingRecipe};
 use crate::records::{RecordError, Records};
 use crate::report::{Phase, Rates};
 use crate::samples::Drawn;
+use crate::schedule::Schedule;
 use crate::tensors::rows;
+
+/// `eigenbasis`.
+pub(super) static EIGENBASIS: MethodSpec = MethodSpec {
+    name: "eigenbasis",
+    geometry: None,
+    about: "a divergence-free flow in a sine basis, fitted to the correspondences",
+    citation: "Eisenberger, Laehner, Cremers, \"Divergence-Free Shape Interpolation and \
+               Correspondence\", Eurographics 2019",
+    needs: Needs {
+        normals: false,
+        correspondences: true,
+        mesh: true,
+    },
+    is_baseline: true,
+    acts: Acts {
+        implicit: Keys::None,
+        velocity: Keys::None,
+        loss: Keys::Only(&["matching", "matching-scale"]),
+        training: Keys::Only(&[
+            "steps",
+            "correspondence-batch",
+            "velocity-learning-rate",
+            "schedule",
+            "decay",
+            "decay-every",
+            "final-learning-rate",
+            "clip",
+            "seed",
+            "log-every",
+        ]),
+    },
+    own: Some(EigenbasisKeys::SECTION),
+    fixed: &[("eigenbasis.modes", "a fitted flow cannot change its basis")],
+    // Coefficients of one size each: the steps can be larger than a network's.
+    changes: &["training.velocity-learning-rate=1e-2"],
+};
+
+section! {
+    /// The keys of the method "eigenbasis".
+    eigenbasis: EigenbasisKeys {
+        /// Sine modes along each axis.
+        modes: usize = 6 | 6 | 6 | 6, Rule::whole(1, 16);
+        /// Weight of the regulariser that keeps the modes small, higher ones more.
+        prior: f64 = 0.01 | 0.01 | 0.01 | 0.01, Rule::positive_or_zero().zero("turns it off");
+    }
+}
 
 /// Steps of the integrator between two times: the field is fixed, and as smooth as its highest mode.
 const STEPS: Steps = Steps::Even(8);
@@ -25,7 +74,7 @@ const STEPS: Steps = Steps::Even(8);
 const PADDING: f64 = 0.15;
 
 /// The flow and how it is fitted.
-pub(super) struct Flow<B: TrainBackend> {
+pub(super) struct SineFlow<B: TrainBackend> {
     training: TrainingRecipe,
     weights: EigenbasisWeights,
     schedule: Schedule,
@@ -33,11 +82,12 @@ pub(super) struct Flow<B: TrainBackend> {
     net: Trainee<B, Eigenbasis<B>>,
 }
 
-impl<B: TrainBackend> Flow<B> {
+impl<B: TrainBackend> SineFlow<B> {
     /// Before the first step.
     pub(super) fn new(recipe: &Recipe, bounds: &Bounds, device: &B::Device) -> Self {
+        let keys = recipe.keys_of::<EigenbasisKeys>();
         let config = EigenbasisConfig {
-            modes: recipe.method.modes,
+            modes: keys.modes,
             lower: bounds.min.map(f64::from),
             upper: bounds.max.map(f64::from),
             padding: PADDING,
@@ -50,7 +100,7 @@ impl<B: TrainBackend> Flow<B> {
             weights: EigenbasisWeights {
                 matching: recipe.loss.matching,
                 robust_scale: recipe.loss.matching_scale,
-                prior: recipe.method.prior,
+                prior: keys.prior,
             },
             net: Trainee::new("velocity", config.init(device), device),
             device: device.clone(),
@@ -58,7 +108,7 @@ impl<B: TrainBackend> Flow<B> {
     }
 }
 
-impl<B: TrainBackend> Method<B> for Flow<B> {
+impl<B: TrainBackend> Method<B> for SineFlow<B> {
     fn phase(&self, _: usize) -> Phase {
         Phase::Motion
     }

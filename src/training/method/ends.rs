@@ -10,18 +10,130 @@ use isomorph_model::baseline::lipmlp::{LipMlp, LipMlpConfig};
 use isomorph_model::baseline::mlp::{PlainMlp, PlainMlpConfig};
 use isomorph_model::{Geometry, Motion, Objective, TrainBackend};
 
+use super::spec::{Acts, Keys, MethodSpec, Needs};
 use super::{Method, Trainee};
-use crate::data::TrainingData;
+use crate::data::{Bounds, TrainingData};
 use crate::posed::{Posed, Slopes};
-use crate::schedule::Schedule;
-use crate::settings::{Settings, end_weights};
 use crate::recipe::Recipe;
+use crate::recipe::rule::Rule;
+use crate::recipe::schema::{Keyed, section};
 use crate::records::{RecordError, Records};
 use crate::report::{Phase, Rates};
 use crate::samples::{self, Drawn, EndBatch};
+use crate::schedule::Schedule;
+use crate::settings::{Settings, end_weights};
 use crate::tensors::{column, rows};
 
-/// A network that knows what its step at the ends minimises.
+/// `mlp`.
+pub(super) static MLP: MethodSpec = MethodSpec {
+    name: "mlp",
+    geometry: None,
+    about: "one network f(x, t), fitted at t = 0 and t = 1 only",
+    citation: "the baseline of the same name in Sang et al., ICLR 2025, Section 5",
+    needs: Needs::NOTHING,
+    is_baseline: true,
+    acts: AT_ENDS,
+    own: None,
+    fixed: &[],
+    changes: &SOFT,
+};
+
+/// `sdf-blend`.
+pub(super) static SDF_BLEND: MethodSpec = MethodSpec {
+    name: "sdf-blend",
+    geometry: None,
+    about: "the linear blend of two distance fields, (1 - t) g + t h",
+    citation: "Payne and Toga, \"Distance field manipulation of surface models\", 1992",
+    needs: Needs::NOTHING,
+    is_baseline: true,
+    acts: AT_ENDS,
+    own: None,
+    fixed: &[],
+    changes: &SOFT,
+};
+
+/// `lipmlp`.
+pub(super) static LIPMLP: MethodSpec = MethodSpec {
+    name: "lipmlp",
+    geometry: None,
+    about: "one network f(x, t) with a small Lipschitz constant, fitted at t = 0 and t = 1 only",
+    citation: "Liu, Williams, Jacobson, Fidler, Litany, \"Learning Smooth Neural Functions via \
+               Lipschitz Regularization\", SIGGRAPH 2022",
+    needs: Needs {
+        normals: true,
+        ..Needs::NOTHING
+    },
+    is_baseline: true,
+    acts: Acts {
+        implicit: Keys::Only(&["depth", "width"]),
+        velocity: Keys::None,
+        loss: Keys::None,
+        training: Keys::Only(&[
+            "steps",
+            "batch",
+            "learning-rate",
+            "schedule",
+            "decay",
+            "decay-every",
+            "final-learning-rate",
+            "band-share",
+            "band-widths",
+            "box-margin",
+            "clip",
+            "seed",
+            "log-every",
+        ]),
+    },
+    own: Some(LipmlpKeys::SECTION),
+    fixed: &[(
+        "lipmlp.space-scale",
+        "a trained network cannot change its input",
+    )],
+    changes: &["training.learning-rate=2e-3"],
+};
+
+section! {
+    /// The keys of the method "lipmlp".
+    lipmlp: LipmlpKeys {
+        /// Weight of the bound on the Lipschitz constant.
+        lipschitz: f64 = 1e-6 | 1e-6 | 1e-6 | 1e-6, Rule::positive_or_zero().zero("turns it off");
+        /// Factor on positions before the network, so that the bound acts on time.
+        space_scale: f64 = 100 | 100 | 100 | 100, Rule::above_zero(1e6);
+    }
+}
+
+/// The terms at the ends, and what samples and optimiser take.
+const AT_ENDS: Acts = Acts {
+    implicit: Keys::All,
+    velocity: Keys::None,
+    loss: Keys::Only(&["data", "normals", "eikonal", "off-surface", "distance"]),
+    training: Keys::Only(&[
+        "steps",
+        "batch",
+        "learning-rate",
+        "schedule",
+        "decay",
+        "decay-every",
+        "final-learning-rate",
+        "derivatives",
+        "band-share",
+        "band-widths",
+        "box-margin",
+        "clip",
+        "seed",
+        "log-every",
+    ]),
+};
+
+/// Softplus networks, as the sources of these methods have them or leave open: sines would give a plain
+/// network between its ends the freedom to dissolve.
+const SOFT: [&str; 3] = [
+    "implicit.activation=softplus",
+    "implicit.beta=100",
+    "training.learning-rate=2e-3",
+];
+
+/// A network and what its step at the ends minimises.
 pub(super) trait EndNet<B: TrainBackend>:
     AutodiffModule<B, InnerModule: Geometry<B::InnerBackend> + 'static> + Sync + 'static
 {
@@ -53,7 +165,7 @@ pub(super) type FitLipMlp<B> = EndFit<B, LipMlp<B>>;
 
 impl<B: TrainBackend, M: EndNet<B>> EndFit<B, M> {
     /// Before the first step.
-    pub(super) fn new(recipe: &Recipe, device: &B::Device) -> Self {
+    pub(super) fn new(recipe: &Recipe, _: &Bounds, device: &B::Device) -> Self {
         let settings = Settings::new(recipe);
         let net = M::new(recipe, &settings, device);
         Self {
@@ -159,13 +271,13 @@ impl<B: TrainBackend> EndNet<B> for LipMlp<B> {
         let config = LipMlpConfig {
             depth: settings.implicit.depth,
             width: settings.implicit.width,
-            space_scale: recipe.method.space_scale,
+            space_scale: recipe.keys_of::<LipmlpKeys>().space_scale,
         };
         config.init(settings.training.seed, device)
     }
 
     fn terms(&self, recipe: &Recipe, _: &Settings, drawn: &OnDevice<B>) -> Objective<B> {
-        self.objective(&drawn.both(), recipe.method.lipschitz)
+        self.objective(&drawn.both(), recipe.keys_of::<LipmlpKeys>().lipschitz)
     }
 
     const DISTANCES: bool = true;

@@ -8,24 +8,51 @@ use isomorph_model::flow::end_fields::{EndFields, EndFieldsConfig};
 use isomorph_model::{FlowGeometry, Geometry, TrainBackend, VelocityNet};
 
 use super::ends::OnDevice;
+use super::spec::{Acts, Keys, MethodSpec, Needs};
 use super::{Method, Trainee};
+use crate::data::{Bounds, TrainingData};
 use crate::flow_step::FlowStep;
 use crate::motion::Motion;
 use crate::posed::{Posed, Slopes};
-use crate::schedule::Schedule;
-use crate::settings::Settings;
-use crate::recipe::Recipe;
-use crate::data::{Bounds, TrainingData};
+use crate::recipe::{GeometryKind, Recipe};
 use crate::records::{RecordError, Records};
 use crate::report::{Phase, Rates};
 use crate::samples::{self, Batch, BatchSizes, Drawn, EndBatch};
+use crate::schedule::Schedule;
+use crate::settings::Settings;
 use crate::tensors::rows;
+
+/// The default method.
+pub(super) static FLOW: MethodSpec = MethodSpec {
+    name: "velocity-field",
+    geometry: Some(GeometryKind::Flow),
+    about: "two end fields, carried by a velocity field V: the default",
+    citation: "after Sang, Canfes, Cao, Bernard, Cremers, \"Implicit Neural Surface \
+               Deformation with Explicit Velocity Fields\", ICLR 2025; the geometry is ours",
+    needs: Needs::NOTHING,
+    is_baseline: false,
+    acts: Acts {
+        implicit: Keys::All,
+        velocity: Keys::All,
+        // The level-set equation holds by itself, and normals are moved by nothing but the flow.
+        loss: Keys::AllBut(&[
+            "level-set",
+            "level-set-form",
+            "lambda-l",
+            "transported-normals",
+        ]),
+        training: Keys::All,
+    },
+    own: None,
+    fixed: &[],
+    changes: &[],
+};
 
 /// Points to a side of the lattice that decides how finely the geometry follows the flow.
 const PROBES: usize = 24;
 
 /// The end fields, the Velocity-Net and how they are trained.
-pub(super) struct Flow<B: TrainBackend> {
+pub(super) struct EndsAndFlow<B: TrainBackend> {
     settings: Settings,
     schedule: Schedule,
     device: B::Device,
@@ -35,7 +62,7 @@ pub(super) struct Flow<B: TrainBackend> {
     velocity: Trainee<B, VelocityNet<B>>,
 }
 
-impl<B: TrainBackend> Flow<B> {
+impl<B: TrainBackend> EndsAndFlow<B> {
     /// All networks as the recipe's seed makes them; `bounds` encloses both shapes, normalised.
     pub(super) fn new(recipe: &Recipe, bounds: &Bounds, device: &B::Device) -> Self {
         let settings = Settings::new(recipe);
@@ -55,7 +82,7 @@ impl<B: TrainBackend> Flow<B> {
     }
 }
 
-impl<B: TrainBackend> Method<B> for Flow<B> {
+impl<B: TrainBackend> Method<B> for EndsAndFlow<B> {
     fn phase(&self, step: usize) -> Phase {
         // The end fields train from the first step, so that there is no warm-up of the velocity alone.
         match self.schedule.phase(step) {

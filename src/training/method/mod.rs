@@ -1,16 +1,18 @@
-//! The methods that the learner can train: ours, and those that it is compared with.
+//! The methods: what can be trained.
 //!
 //! | file | methods (`method.name` in the recipe) |
 //! |---|---|
-//! | `network.rs` | `velocity-field`: `f(x, t)` carried by `V`, the paper's and ours |
-//! | `flow.rs` | the same with `implicit.geometry = "flow"` |
+//! | `flow.rs` | `velocity-field` with `implicit.geometry = "flow"`: the default |
+//! | `network.rs` | `velocity-field` with `implicit.geometry = "network"`: the paper's |
 //! | `ends.rs` | `mlp`, `sdf-blend`, `lipmlp`: fitted at t = 0 and t = 1 only |
 //! | `nise.rs` | `nise`, `nise-velocity` |
 //! | `eigenbasis.rs` | `eigenbasis` |
 //! | `nfgp.rs` | `nfgp` |
 //!
-//! A [`Method`] owns its networks and their optimisers, and says what a step minimises. The loop, the
-//! checkpoints, the surfaces and the evaluation are the same for all of them.
+//! Each file holds all that a method is: its [`MethodSpec`] (name, needs, the keys of the recipe that act,
+//! those that it has alone), and its networks and objective, a [`Method`]. Here stand the only list of
+//! them, [`METHODS`], and what follows from it. The loop, the checkpoints, the surfaces and the evaluation
+//! are the same for all.
 
 mod eigenbasis;
 mod ends;
@@ -18,6 +20,7 @@ mod flow;
 mod network;
 mod nfgp;
 mod nise;
+pub(crate) mod spec;
 
 use std::io;
 
@@ -28,12 +31,90 @@ use isomorph_model::{Geometry, Motion, TrainBackend};
 use crate::data::{Bounds, TrainingData};
 use crate::optimiser::{self, AdamOf};
 use crate::posed::{Posed, Slopes};
-use crate::recipe::{GeometryKind, MethodName, Recipe};
+use crate::recipe::{Change, GeometryKind, Recipe};
 use crate::records::{RecordError, Records};
 use crate::report::{Phase, Rates};
 use crate::samples::Drawn;
 
-/// Something that can be trained on a pair of shapes.
+pub use spec::{MethodSpec, Needs};
+
+/// Declares the list of methods: for each its spec, and the type that trains it.
+macro_rules! methods {
+    (
+        own { $($o:ident::$OWN:ident => $Own:ident,)+ }
+        baselines { $($b:ident::$BASE:ident => $Base:ident,)+ }
+    ) => {
+        /// Every method.
+        pub static METHODS: &[&MethodSpec] = &[$(&$o::$OWN,)+ $(&$b::$BASE,)+];
+
+        /// The default method or the paper's, before its first step; `None` if the recipe names another.
+        /// `bounds` encloses all key frames, normalised.
+        pub fn own<B: TrainBackend>(
+            recipe: &Recipe,
+            bounds: &Bounds,
+            device: &B::Device,
+        ) -> Option<Box<dyn Method<B>>> {
+            let chosen = spec_of(recipe);
+            $( if *chosen == $o::$OWN {
+                return Some(Box::new($o::$Own::<B>::new(recipe, bounds, device)));
+            } )+
+            None
+        }
+
+        /// A method that isomorph is compared with, before its first step; `None` if the recipe names
+        /// none.
+        pub fn baseline<B: TrainBackend>(
+            recipe: &Recipe,
+            bounds: &Bounds,
+            device: &B::Device,
+        ) -> Option<Box<dyn Method<B>>> {
+            let chosen = spec_of(recipe);
+            $( if *chosen == $b::$BASE {
+                return Some(Box::new($b::$Base::<B>::new(recipe, bounds, device)));
+            } )+
+            None
+        }
+    };
+}
+
+methods! {
+    own {
+        flow::FLOW => EndsAndFlow,
+        network::NETWORK => VelocityField,
+    }
+    baselines {
+        ends::MLP => FitMlp,
+        ends::SDF_BLEND => FitBlend,
+        ends::LIPMLP => FitLipMlp,
+        nise::NISE => Evolved,
+        nise::NISE_VELOCITY => Evolved,
+        eigenbasis::EIGENBASIS => SineFlow,
+        nfgp::NFGP => Deformations,
+    }
+}
+
+/// The names of all methods, each once.
+pub fn names() -> Vec<&'static str> {
+    let mut names: Vec<_> = METHODS.iter().map(|spec| spec.name).collect();
+    // Methods of one name stand side by side.
+    names.dedup();
+    names
+}
+
+/// The method of a recipe.
+pub fn spec_of(recipe: &Recipe) -> &'static MethodSpec {
+    let found = spec(recipe.method.name, recipe.implicit.geometry);
+    found.expect("a recipe takes its method's name from the list")
+}
+
+/// The method of a name, where two have it that of the geometry.
+pub(crate) fn spec(name: &str, geometry: GeometryKind) -> Option<&'static MethodSpec> {
+    let fits =
+        |spec: &&&MethodSpec| spec.name == name && spec.geometry.is_none_or(|own| own == geometry);
+    METHODS.iter().find(fits).copied()
+}
+
+/// Something that can be trained on key frames.
 pub trait Method<B: TrainBackend>: Sync {
     /// Into how many equal parts the samples of a step can be divided; they are worked on side by side.
     fn parts(&self) -> usize {
@@ -79,62 +160,42 @@ pub trait Method<B: TrainBackend>: Sync {
     fn motion(&self) -> Option<Box<dyn Motion<B::InnerBackend>>>;
 }
 
-/// The default method or the paper's, before its first step; `None` if the recipe names another.
-/// `bounds` encloses all key frames, normalised.
-pub fn own<B: TrainBackend>(
-    recipe: &Recipe,
-    bounds: &Bounds,
-    device: &B::Device,
-) -> Option<Box<dyn Method<B>>> {
-    if recipe.method.name != MethodName::VelocityField {
-        return None;
-    }
-    Some(match recipe.implicit.geometry {
-        GeometryKind::Network => Box::new(network::VelocityField::<B>::new(recipe, device)),
-        GeometryKind::Flow => Box::new(flow::Flow::<B>::new(recipe, bounds, device)),
-    })
-}
-
-/// A method that isomorph is compared with, before its first step; `None` if the recipe names none.
-pub fn baseline<B: TrainBackend>(
-    recipe: &Recipe,
-    bounds: &Bounds,
-    device: &B::Device,
-) -> Option<Box<dyn Method<B>>> {
-    Some(match recipe.method.name {
-        MethodName::VelocityField => return None,
-        MethodName::Mlp => Box::new(ends::FitMlp::<B>::new(recipe, device)),
-        MethodName::SdfBlend => Box::new(ends::FitBlend::<B>::new(recipe, device)),
-        MethodName::Lipmlp => Box::new(ends::FitLipMlp::<B>::new(recipe, device)),
-        MethodName::Nise | MethodName::NiseVelocity => {
-            Box::new(nise::Evolved::<B>::new(recipe, device))
-        }
-        MethodName::Eigenbasis => Box::new(eigenbasis::Flow::<B>::new(recipe, bounds, device)),
-        MethodName::Nfgp => Box::new(nfgp::Deformations::<B>::new(recipe, device)),
-    })
-}
-
 /// Whether the data has what the recipe's method needs.
 ///
 /// # Errors
 /// What is missing, and what to do about it.
 pub fn check(recipe: &Recipe, data: &TrainingData) -> Result<(), String> {
-    let name = recipe.method.name;
-    let normals = data.has_normals();
-    if matches!(name, MethodName::Lipmlp | MethodName::Nfgp) && !normals {
+    let MethodSpec { name, needs, .. } = spec_of(recipe);
+    if needs.normals && !data.has_normals() {
         return Err(format!(
-            "method.name = \"{name}\": it is trained on the normals of the shapes, and data.normals = \
-             \"none\"; set it to \"auto\", or choose another method"
+            "method.name = \"{name}\": it {}, and the shapes have none; set data.normals to \"auto\", or \
+             choose another method",
+            spec::ON_NORMALS
         ));
     }
-    let matched = matches!(name, MethodName::Eigenbasis | MethodName::Nfgp);
-    if matched && data.pair_count() == 0 {
+    if needs.correspondences && data.pair_count() == 0 {
         return Err(format!(
-            "method.name = \"{name}\": it is fitted to correspondences, and data.correspondences = \
-             \"none\"; name a file of pairs there, or choose another method"
+            "method.name = \"{name}\": it {}, and none are known; name a file of pairs in \
+             data.correspondences, or choose another method",
+            spec::ON_CORRESPONDENCES
         ));
     }
     Ok(())
+}
+
+/// The first change that a run cannot take once it has begun, and why: another method, another network, or
+/// a key that the method fixes.
+pub fn fixed_change(before: &Recipe, after: &Recipe) -> Option<(Change, &'static str)> {
+    let fixed = spec_of(before).fixed;
+    before.changes(after).into_iter().find_map(|change| {
+        let section = change.key.split('.').next().unwrap_or_default();
+        let why = match section {
+            "method" => "a run keeps its method",
+            "implicit" | "velocity" => "a trained network cannot change its shape",
+            _ => fixed.iter().find(|(key, _)| *key == change.key)?.1,
+        };
+        Some((change, why))
+    })
 }
 
 /// A network with the optimiser that moves it, under the name of its files.

@@ -1,22 +1,44 @@
-//! `f(x, t)` carried by `V`, trained together: the paper's method and ours, which differ in weights,
-//! sampling and terms only (`recipe/keys.rs`, the columns of the presets).
+//! The paper's geometry (`implicit.geometry = "network"`): one network `f(x, t)` and the velocity field `V`
+//! that carries it, trained together. The preset `paper` differs from the others in weights, sampling and
+//! terms (`recipe/keys.rs`, the columns of the presets).
 
 use std::io;
 
 use burn::module::Module;
 use isomorph_model::{Geometry, ImplicitNet, TrainBackend, VelocityNet};
 
+use super::spec::{Acts, Keys, MethodSpec, Needs};
 use super::{Method, Trainee};
-use crate::data::TrainingData;
+use crate::data::{Bounds, TrainingData};
 use crate::motion::Motion;
-use crate::posed::{Posed, Slopes};
-use crate::schedule::Schedule;
-use crate::settings::Settings;
 use crate::network_step::Step;
-use crate::recipe::Recipe;
+use crate::posed::{Posed, Slopes};
+use crate::recipe::{GeometryKind, Recipe};
 use crate::records::{RecordError, Records};
 use crate::report::{Phase, Rates};
 use crate::samples::{self, Batch, BatchSizes, Drawn};
+use crate::schedule::Schedule;
+use crate::settings::Settings;
+
+/// The paper's method.
+pub(super) static NETWORK: MethodSpec = MethodSpec {
+    name: "velocity-field",
+    geometry: Some(GeometryKind::Network),
+    about: "one network f(x, t), tied to a velocity field V by the level-set equation: the paper's",
+    citation: "Sang, Canfes, Cao, Bernard, Cremers, \"Implicit Neural Surface Deformation with \
+               Explicit Velocity Fields\", ICLR 2025",
+    needs: Needs::NOTHING,
+    is_baseline: false,
+    acts: Acts {
+        implicit: Keys::All,
+        velocity: Keys::All,
+        loss: Keys::AllBut(&["distance"]),
+        training: Keys::All,
+    },
+    own: None,
+    fixed: &[],
+    changes: &[],
+};
 
 /// The two networks and how they are trained.
 pub(super) struct VelocityField<B: TrainBackend> {
@@ -29,7 +51,7 @@ pub(super) struct VelocityField<B: TrainBackend> {
 
 impl<B: TrainBackend> VelocityField<B> {
     /// Both networks as the recipe's seed makes them.
-    pub(super) fn new(recipe: &Recipe, device: &B::Device) -> Self {
+    pub(super) fn new(recipe: &Recipe, _: &Bounds, device: &B::Device) -> Self {
         let settings = Settings::new(recipe);
         let seed = settings.training.seed;
         let implicit = settings.implicit.init(seed, device);

@@ -10,15 +10,78 @@ use isomorph_model::baseline::nfgp::{
 };
 use isomorph_model::{Geometry, Motion, TrainBackend};
 
+use super::spec::{Acts, Keys, MethodSpec, Needs};
 use super::{Method, Trainee};
-use crate::data::TrainingData;
+use crate::data::{Bounds, TrainingData};
 use crate::posed::{Posed, Slopes};
-use crate::schedule::Schedule;
+use crate::recipe::rule::Rule;
+use crate::recipe::schema::{Keyed, section};
 use crate::recipe::{Recipe, TrainingRecipe};
 use crate::records::{RecordError, Records};
 use crate::report::{Phase, Rates};
 use crate::samples::{Drawn, Neighbouring};
+use crate::schedule::Schedule;
 use crate::tensors::rows;
+
+/// `nfgp`.
+pub(super) static NFGP: MethodSpec = MethodSpec {
+    name: "nfgp",
+    geometry: None,
+    about: "invertible deformations, one for each time",
+    citation: "Yang, Belongie, Hariharan, Koltun, \"Geometry Processing with Neural Fields\", \
+               NeurIPS 2021",
+    needs: Needs {
+        normals: true,
+        correspondences: true,
+        mesh: true,
+    },
+    is_baseline: true,
+    acts: Acts {
+        implicit: Keys::Only(&["width"]),
+        velocity: Keys::None,
+        loss: Keys::None,
+        training: Keys::Only(&[
+            "steps",
+            "batch",
+            "correspondence-batch",
+            "velocity-learning-rate",
+            "schedule",
+            "decay",
+            "decay-every",
+            "final-learning-rate",
+            "clip",
+            "seed",
+            "log-every",
+        ]),
+    },
+    own: Some(NfgpKeys::SECTION),
+    fixed: &[
+        ("nfgp.deformations", SHARED_OUT),
+        ("nfgp.blocks", "a trained network cannot change its shape"),
+        ("training.steps", SHARED_OUT),
+    ],
+    // Its normalised layers learn slowly.
+    changes: &["training.velocity-learning-rate=3e-3"],
+};
+
+const SHARED_OUT: &str = "the method trains one deformation after the other and shares its steps out \
+                          among them, so their number is fixed";
+
+section! {
+    /// The keys of the method "nfgp".
+    nfgp: NfgpKeys {
+        /// Times at which a deformation is fitted, each with its share of the steps.
+        deformations: usize = 8 | 8 | 8 | 8, Rule::whole(1, 1000);
+        /// Residual blocks of a deformation.
+        blocks: usize = 6 | 6 | 6 | 6, Rule::whole(1, 32);
+        /// Weight of the distance between the correspondences and their places at that time.
+        handles: f64 = 100 | 100 | 100 | 100, Rule::positive_or_zero().zero("turns it off");
+        /// Weight of the change of lengths on the surface.
+        stretch: f64 = 0.1 | 0.1 | 0.1 | 0.1, Rule::positive_or_zero().zero("turns it off");
+        /// Weight of the change of curvature.
+        bend: f64 = 1e-3 | 1e-3 | 1e-3 | 1e-3, Rule::positive_or_zero().zero("turns it off");
+    }
+}
 
 /// The deformations and the one in work.
 pub(super) struct Deformations<B: TrainBackend> {
@@ -34,14 +97,15 @@ pub(super) struct Deformations<B: TrainBackend> {
 
 impl<B: TrainBackend> Deformations<B> {
     /// Before the first step.
-    pub(super) fn new(recipe: &Recipe, device: &B::Device) -> Self {
+    pub(super) fn new(recipe: &Recipe, _: &Bounds, device: &B::Device) -> Self {
+        let keys = recipe.keys_of::<NfgpKeys>();
         let config = NfgpMotionConfig {
             deformation: NfgpConfig {
-                blocks: recipe.method.blocks,
+                blocks: keys.blocks,
                 width: recipe.implicit.width,
                 ..NfgpConfig::default()
             },
-            times: recipe.method.deformations,
+            times: keys.deformations,
             inverse: FixedPoint::default(),
         };
         let motion: NfgpMotion<B> = config.init(recipe.training.seed, device);
@@ -49,9 +113,9 @@ impl<B: TrainBackend> Deformations<B> {
             schedule: Schedule::new(&recipe.training),
             training: recipe.training.clone(),
             weights: NfgpWeights {
-                handles: recipe.method.handles,
-                stretch: recipe.method.stretch,
-                bend: recipe.method.bend,
+                handles: keys.handles,
+                stretch: keys.stretch,
+                bend: keys.bend,
             },
             work: Trainee::new("deformation", motion.start(0), device),
             done: Trainee::new("deformations", motion, device),

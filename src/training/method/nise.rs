@@ -2,7 +2,7 @@
 //!
 //! | steps | trained |
 //! |---|---|
-//! | up to `method.ends-until` of them | the end fields `g` and `h`, each on its own shape |
+//! | up to `nise.ends-until` of them | the end fields `g` and `h`, each on its own shape |
 //! | the others | `f`, with `g` and `h` as constants |
 
 use std::io;
@@ -14,20 +14,110 @@ use isomorph_model::baseline::nise::{BetweenSamples, Evolution, Nise, NiseConfig
 use isomorph_model::{Geometry, ImplicitNetConfig, Motion, TrainBackend};
 
 use super::ends::OnDevice;
+use super::spec::{Acts, Keys, MethodSpec, Needs};
 use super::{Method, Trainee};
-use crate::data::TrainingData;
+use crate::data::{Bounds, TrainingData};
 use crate::posed::{Posed, Slopes};
-use crate::schedule::Schedule;
-use crate::settings::{Settings, end_weights};
-use crate::recipe::{MethodName, MethodRecipe, Recipe};
+use crate::recipe::Recipe;
+use crate::recipe::rule::Rule;
+use crate::recipe::schema::{Keyed, section};
 use crate::records::{RecordError, Records};
 use crate::report::{Phase, Rates};
 use crate::samples::{self, Drawn, EndBatch};
+use crate::schedule::Schedule;
+use crate::settings::{Settings, end_weights};
 use crate::tensors::{column, rows};
+
+/// `nise`.
+pub(super) static NISE: MethodSpec = MethodSpec {
+    name: "nise",
+    geometry: None,
+    about: "two end fields, and f(x, t) between them under a level-set equation",
+    citation: CITATION,
+    needs: Needs::NOTHING,
+    is_baseline: true,
+    acts: ACTS,
+    own: Some(NiseKeys::SECTION),
+    fixed: &FIXED,
+    changes: &CHANGES,
+};
+
+/// `nise-velocity`.
+pub(super) static NISE_VELOCITY: MethodSpec = MethodSpec {
+    name: "nise-velocity",
+    geometry: None,
+    about: "the same as nise with an interpolated velocity",
+    citation: CITATION,
+    needs: Needs::NOTHING,
+    is_baseline: true,
+    acts: ACTS,
+    own: Some(NiseKeys::SECTION),
+    fixed: &FIXED,
+    changes: &CHANGES,
+};
+
+section! {
+    /// The keys of the methods "nise" and "nise-velocity".
+    nise: NiseKeys {
+        /// Until here only the two end fields train.
+        ends_until: f64 = 0.4 | 0.4 | 0.4 | 0.4, Rule::above_zero(0.9).unit("share of the steps");
+        /// Frequency of the sine networks. Its authors print 20 to 30.
+        omega: f64 = 20 | 20 | 20 | 20, Rule::above_zero(1000.0);
+        /// Weight of the difference between f and the end fields at t = 0 and t = 1.
+        ends: f64 = 10_000 | 10_000 | 10_000 | 10_000,
+            Rule::positive_or_zero().zero("frees f from its ends");
+        /// Weight of the residual of the equation between them.
+        residual: f64 = 10 | 10 | 10 | 10, Rule::positive_or_zero().zero("turns it off");
+    }
+}
+
+const CITATION: &str = "Novello, da Silva, Schardong, Schirmer, Lopes, Velho, \"Neural Implicit \
+                        Surface Evolution\", ICCV 2023";
+
+/// The networks are sines of a frequency of their own; distances are not used.
+const ACTS: Acts = Acts {
+    implicit: Keys::AllBut(&["activation", "beta"]),
+    velocity: Keys::None,
+    loss: Keys::Only(&["data", "normals", "eikonal", "off-surface"]),
+    training: Keys::Only(&[
+        "steps",
+        "batch",
+        "learning-rate",
+        "schedule",
+        "decay",
+        "decay-every",
+        "final-learning-rate",
+        "time-steps",
+        "times",
+        "derivatives",
+        "band-share",
+        "band-widths",
+        "box-margin",
+        "clip",
+        "seed",
+        "log-every",
+    ]),
+};
+
+const FIXED: [(&str, &str); 3] = [
+    (
+        "nise.omega",
+        "a trained network cannot change its frequency",
+    ),
+    ("nise.ends-until", SHARED_OUT),
+    ("training.steps", SHARED_OUT),
+];
+
+const SHARED_OUT: &str = "the method trains one network after the other and shares its steps out \
+                          among them, so their number is fixed";
+
+/// Sines learn faster: at 2e-3 their fields fray.
+const CHANGES: [&str; 1] = ["training.learning-rate=5e-4"];
 
 /// The end fields and what lies between them.
 pub(super) struct Evolved<B: TrainBackend> {
-    method: MethodRecipe,
+    keys: NiseKeys,
+    evolution: Evolution,
     settings: Settings,
     schedule: Schedule,
     device: B::Device,
@@ -39,19 +129,26 @@ pub(super) struct Evolved<B: TrainBackend> {
 
 impl<B: TrainBackend> Evolved<B> {
     /// Before the first step.
-    pub(super) fn new(recipe: &Recipe, device: &B::Device) -> Self {
+    pub(super) fn new(recipe: &Recipe, _: &Bounds, device: &B::Device) -> Self {
+        let keys = recipe.keys_of::<NiseKeys>();
+        let evolution = if recipe.method.name == NISE_VELOCITY.name {
+            Evolution::InterpolatedVelocity
+        } else {
+            Evolution::CrossFade
+        };
         let settings = Settings::new(recipe);
         let training = &settings.training;
-        let share = recipe.method.ends_until * training.steps as f64;
-        let implicit = sine(&recipe.method, settings.implicit);
+        let share = keys.ends_until * training.steps as f64;
+        let implicit = sine(keys.omega, settings.implicit);
         let ends = SdfBlendConfig { implicit }.init(training.seed, device);
-        let net = field(&recipe.method, &settings, ends.clone(), device);
+        let net = field(keys.omega, evolution, &settings, ends.clone(), device);
         Self {
             between_from: (share.round() as usize).max(1),
             schedule: Schedule::new(training),
             ends: Trainee::new("ends", ends, device),
             net: Trainee::new("implicit", net, device),
-            method: recipe.method.clone(),
+            keys,
+            evolution,
             device: device.clone(),
             settings,
         }
@@ -59,28 +156,24 @@ impl<B: TrainBackend> Evolved<B> {
 }
 
 /// The recipe's Implicit-Net with sines, which the method is about.
-fn sine(method: &MethodRecipe, implicit: ImplicitNetConfig) -> ImplicitNetConfig {
+fn sine(omega: f64, implicit: ImplicitNetConfig) -> ImplicitNetConfig {
     ImplicitNetConfig {
-        activation: Activation::Sine {
-            omega: method.omega,
-        },
+        activation: Activation::Sine { omega },
         ..implicit
     }
 }
 
 /// `f` before its first step, between two end fields.
 fn field<B: TrainBackend>(
-    method: &MethodRecipe,
+    omega: f64,
+    evolution: Evolution,
     settings: &Settings,
     ends: SdfBlend<B>,
     device: &B::Device,
 ) -> Nise<B> {
     let config = NiseConfig {
-        implicit: sine(method, settings.implicit),
-        evolution: match method.name {
-            MethodName::NiseVelocity => Evolution::InterpolatedVelocity,
-            _ => Evolution::CrossFade,
-        },
+        implicit: sine(omega, settings.implicit),
+        evolution,
     };
     config.init(ends, settings.training.seed.wrapping_add(2), device)
 }
@@ -130,9 +223,9 @@ impl<B: TrainBackend> Method<B> for Evolved<B> {
             return Posed::new(objective).by(ends);
         }
         let weights = NiseWeights {
-            data: self.method.ends,
+            data: self.keys.ends,
             normals: self.settings.loss.normals,
-            level_set: self.method.residual,
+            level_set: self.keys.residual,
         };
         let between = BetweenSamples {
             points: rows(&drawn.batch.space.points, &self.device),
@@ -154,7 +247,13 @@ impl<B: TrainBackend> Method<B> for Evolved<B> {
         self.ends.advance(slopes.take(0), rate, clip);
         if step + 1 == self.between_from {
             let ends = self.ends.net.clone();
-            let net = field(&self.method, &self.settings, ends, &self.device);
+            let net = field(
+                self.keys.omega,
+                self.evolution,
+                &self.settings,
+                ends,
+                &self.device,
+            );
             self.net = Trainee::new("implicit", net, &self.device);
         }
     }

@@ -1,8 +1,10 @@
 //! Values that exclude each other although each is in its range.
 
+use super::entry::{Entries, Entry, Place};
 use super::error::RecipeError;
 use super::rule::Value;
-use super::source::{Entries, Entry, Place};
+use super::words::Correspondences;
+use crate::method::{MethodSpec, spec};
 
 /// How the first of two keys must compare with the second.
 #[derive(Debug, Clone, Copy)]
@@ -46,36 +48,17 @@ impl Relation {
     }
 }
 
-/// A value that leaves some methods without what they learn from.
-struct Lack {
-    key: &'static str,
-    value: &'static str,
-    methods: &'static [&'static str],
-    /// What they do with what is lacking, and the cure.
-    need: &'static str,
-}
-
-const LACKS: [Lack; 2] = [
-    Lack {
-        key: "data.normals",
-        value: "none",
-        methods: &["lipmlp", "nfgp"],
-        need: "is trained on the normals of the shapes; set it to \"auto\"",
-    },
-    Lack {
-        key: "data.correspondences",
-        value: "none",
-        methods: &["eigenbasis", "nfgp"],
-        need: "is fitted to correspondences; name a file of pairs there",
-    },
-];
-
-/// Checks every relation between two keys of a complete recipe, and what its method needs.
+/// Checks every relation between two keys of a complete recipe, and what its method needs. Keys that do
+/// nothing are not among the entries; `between` is what is known from each key frame to the next.
 ///
 /// # Errors
 /// The first one that does not hold; the message begins with a value that the user gave.
-pub(super) fn check(entries: &Entries) -> Result<(), RecipeError> {
-    lacks(entries)?;
+pub(super) fn check(
+    entries: &Entries,
+    spec: &MethodSpec,
+    between: &[Correspondences],
+) -> Result<(), RecipeError> {
+    lacks(entries, spec, between)?;
     for (first, relation, second) in RELATIONS {
         let (Some(one), Some(other)) = (entries.get(first), entries.get(second)) else {
             continue;
@@ -84,43 +67,53 @@ pub(super) fn check(entries: &Entries) -> Result<(), RecipeError> {
             continue;
         }
         return Err(match one.place {
-            Place::Preset(_) => conflict((second, other), relation.backwards(), (first, one)),
-            _ => conflict((first, one), relation.forwards(), (second, other)),
+            Place::Preset(_) => conflict(other, relation.backwards(), one),
+            _ => conflict(one, relation.forwards(), other),
         });
     }
     Ok(())
 }
 
 /// Whether the method has what it learns from.
-fn lacks(entries: &Entries) -> Result<(), RecipeError> {
-    let Some(method) = entries.get("method.name") else {
-        return Ok(());
-    };
-    let is = |entry: &Entry, word: &str| matches!(&entry.value, Value::Text(text) if text == word);
-    for lack in &LACKS {
-        if let Some(entry) = entries.get(lack.key)
-            && is(entry, lack.value)
-            && lack.methods.iter().any(|name| is(method, name))
-        {
+fn lacks(
+    entries: &Entries,
+    spec: &MethodSpec,
+    between: &[Correspondences],
+) -> Result<(), RecipeError> {
+    let none_known = between.iter().all(|known| *known == Correspondences::None);
+    let lacking = [
+        (
+            spec.needs.normals,
+            "data.normals",
+            spec::ON_NORMALS,
+            "set it to \"auto\"",
+        ),
+        (
+            spec.needs.correspondences && none_known,
+            "data.correspondences",
+            spec::ON_CORRESPONDENCES,
+            "name a file of pairs there",
+        ),
+    ];
+    for (needed, key, need, cure) in lacking {
+        let none = |entry: &&Entry| matches!(&entry.value, Value::Text(text) if text == "none");
+        if needed && let Some(entry) = entries.get(key).filter(none) {
             return Err(RecipeError::Lacking {
-                at: entry.place.about(lack.key, &entry.value.to_string()),
-                method: method.value.to_string(),
-                need: lack.need,
+                at: entry.about(),
+                method: spec.name,
+                need,
+                cure,
             });
         }
     }
     Ok(())
 }
 
-fn conflict(
-    (key, entry): (&str, &Entry),
-    relation: &'static str,
-    (other_key, other): (&str, &Entry),
-) -> RecipeError {
+fn conflict(entry: &Entry, relation: &'static str, other: &Entry) -> RecipeError {
     RecipeError::Conflict {
-        at: entry.place.about(key, &entry.value.to_string()),
+        at: entry.about(),
         relation,
-        other: format!("{other_key} = {}", other.value),
+        other: format!("{} = {}", other.key.id(), other.value),
         place: other.place.to_string(),
     }
 }
@@ -136,14 +129,14 @@ fn magnitude(value: &Value) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::recipe::keys::KEYS;
+    use crate::recipe::catalogue;
     use crate::recipe::rule::Kind;
 
     #[test]
     fn every_relation_names_two_numbers_that_there_are() {
         for (first, _, second) in RELATIONS {
             for id in [first, second] {
-                let key = KEYS.iter().find(|key| key.id() == id).expect(id);
+                let key = catalogue::by_id(id).expect(id);
                 assert!(
                     matches!(key.rule.kind, Kind::Whole { .. } | Kind::Number(_)),
                     "{id}"

@@ -68,24 +68,54 @@ pub enum RecipeError {
         place: String,
     },
     /// The method has nothing to learn from.
-    #[error("{at}: the method {method} {need}, or choose another method.name")]
+    #[error("{at}: the method \"{method}\" {need}; {cure}, or choose another method.name")]
     Lacking {
         /// File, line, key and value, or override.
         at: String,
-        /// The method, as TOML.
-        method: String,
-        /// What it does with what is lacking, and the cure.
+        /// The method.
+        method: &'static str,
+        /// What it does with what is lacking.
         need: &'static str,
+        /// What to do.
+        cure: &'static str,
+    },
+    /// A key that does nothing in the chosen method, or in no method any more.
+    #[error("{at}: {idle}; {cure}{others}")]
+    Idle {
+        /// File, line, key and value, or override.
+        at: String,
+        /// "does nothing in the method ...", or why it is no key.
+        idle: String,
+        /// What to do, and where the key acts.
+        cure: String,
+        /// Other lines of the file that do nothing either.
+        others: String,
+    },
+    /// Key frames that are none.
+    #[error("{at}: {problem}")]
+    KeyFrames {
+        /// File, line, key and value, or override.
+        at: String,
+        /// What is wrong, and what to do.
+        problem: String,
+    },
+    /// Key frames that can be written, but not yet trained on.
+    #[error(
+        "{at}: training on more than two key frames is not possible yet; give source and target"
+    )]
+    NotYet {
+        /// File and line, or override.
+        at: String,
     },
     /// A key without which no recipe works.
-    #[error("{}: {key} is missing ({allowed}); add it under [{section}]", path.display())]
+    #[error("{}: {key} is missing ({allowed}); add it under {header}", path.display())]
     Missing {
         /// The recipe.
         path: PathBuf,
         /// The key with its section.
         key: String,
-        /// Its section.
-        section: &'static str,
+        /// What it stands under.
+        header: String,
         /// The values allowed.
         allowed: String,
     },

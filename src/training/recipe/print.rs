@@ -1,59 +1,55 @@
-//! A recipe as text: every key resolved, or a first recipe for someone to edit.
+//! A resolved recipe as text, and how keys are explained in comments.
 
-use super::keys::{KEYS, PRESET, SECTIONS};
-use super::rule::Value;
+use super::Recipe;
+use super::catalogue;
+use super::data::KEYFRAME;
 use super::schema::Key;
-use super::words::Preset;
 
 /// Columns that a comment may take.
 const COLUMNS: usize = 100;
 
-/// Every key with its value; `values` are in the order of `KEYS`.
-pub(super) fn resolved(preset: Preset, values: &[Value]) -> String {
-    let mut text = comment("The recipe of this run, resolved: every key with the value it has.");
-    text.push_str(&format!("preset = \"{preset}\"\n"));
-    for section in SECTIONS {
-        text.push_str(&format!("\n{}[{}]\n", comment(section.doc), section.name));
-        for (key, value) in KEYS
-            .iter()
-            .zip(values)
-            .filter(|(key, _)| key.section == section.name)
-        {
-            text.push_str(&about(key));
-            text.push_str(&format!("{} = {value}\n", key.name()));
+impl Recipe {
+    /// The recipe with every key that acts, each under its meaning as a comment; read again, it is the same
+    /// recipe.
+    pub fn to_toml(&self) -> String {
+        let mut text =
+            comment("The resolved recipe of this run: every key that acts, with its value.");
+        text.push_str(&format!("preset = \"{}\"\n", self.preset));
+        let values = self.acting();
+        for section in catalogue::sections() {
+            let of_it = |key: &Key| key.section == section.name;
+            if !values.iter().any(|(key, _)| of_it(key)) {
+                continue;
+            }
+            text.push_str(&format!("\n{}[{}]\n", comment(section.doc), section.name));
+            for (key, value) in values.iter().filter(|(key, _)| of_it(key)) {
+                text.push_str(&about(key, key.doc));
+                text.push_str(&format!("{} = {value}\n", key.name()));
+            }
+            if section.name == "data" {
+                text.push_str(&self.keyframes());
+            }
         }
+        text
     }
-    text
+
+    /// The key frames where `source` and `target` do not say them.
+    fn keyframes(&self) -> String {
+        let mut text = String::new();
+        for values in self.data.keyframe_values() {
+            text.push_str("\n[[data.keyframe]]\n");
+            for (key, value) in KEYFRAME.iter().zip(values) {
+                let line = value.map(|value| format!("{} = {value}\n", key.name()));
+                text.push_str(&line.unwrap_or_default());
+            }
+        }
+        text
+    }
 }
 
-/// A recipe to edit: the data live, every other key as a comment `#key = value`, beside it the
-/// other presets' values where they differ.
-pub(super) fn commented(preset: Preset, data: impl Fn(&Key) -> Option<Value>) -> String {
-    let mut text = comment(
-        "A recipe of isomorph: how the source becomes the target. A line such as `#depth = 5` \
-         shows the value that the preset gives; to change it, remove the # and edit. \
-         `isomorph train` with the name of this file starts the run.",
-    );
-    text.push('\n');
-    text.push_str(&about(&PRESET));
-    text.push_str(&format!("preset = \"{preset}\"\n"));
-    for section in SECTIONS {
-        text.push_str(&format!("\n{}[{}]\n", comment(section.doc), section.name));
-        for key in KEYS.iter().filter(|key| key.section == section.name) {
-            text.push_str(&about(key));
-            let value = data(key).or_else(|| key.preset_value(preset));
-            let value = value.expect("the data section's required keys are given");
-            let mark = if section.name == "data" { "" } else { "#" };
-            let elsewhere = other_presets(key, preset, &value);
-            text.push_str(&format!("{mark}{} = {value}{elsewhere}\n", key.name()));
-        }
-    }
-    text
-}
-
-/// The comment above a key: its documentation and, on the same line if it fits, what is allowed.
-fn about(key: &Key) -> String {
-    let doc = comment(key.doc);
+/// The comment above a key: its meaning and, on the same line if it fits, what is allowed.
+pub(super) fn about(key: &Key, meaning: &str) -> String {
+    let doc = comment(meaning);
     let allowed = format!("[{}]", key.rule.described());
     let last = doc.trim_end().lines().last().unwrap_or_default();
     if last.chars().count() + 1 + allowed.chars().count() <= COLUMNS {
@@ -63,25 +59,8 @@ fn about(key: &Key) -> String {
     }
 }
 
-/// A comment that names the presets in which the key has another value.
-fn other_presets(key: &Key, preset: Preset, value: &Value) -> String {
-    let others: Vec<String> = Preset::ALL
-        .iter()
-        .copied()
-        .filter(|other| *other != preset && key.section != "data")
-        .filter_map(|other| Some((other, key.preset_value(other)?)))
-        .filter(|(_, there)| there != value)
-        .map(|(other, there)| format!("{other}: {there}"))
-        .collect();
-    if others.is_empty() {
-        String::new()
-    } else {
-        format!("  # {}", others.join(", "))
-    }
-}
-
 /// The text as comment lines that begin with "# ", broken between words.
-fn comment(text: &str) -> String {
+pub(super) fn comment(text: &str) -> String {
     let mut lines = String::new();
     let mut line = String::from("#");
     for word in text.split_whitespace() {

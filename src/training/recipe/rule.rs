@@ -7,7 +7,7 @@ use toml::de::DeValue;
 
 /// A value that has passed its key's rule.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Value {
+pub(crate) enum Value {
     Whole(u64),
     Number(f64),
     Numbers(Vec<f64>),
@@ -46,7 +46,7 @@ fn write_number(out: &mut fmt::Formatter<'_>, number: f64) -> fmt::Result {
 
 /// The type of a key and its range.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Kind {
+pub(crate) enum Kind {
     Whole {
         low: u64,
         high: u64,
@@ -64,16 +64,16 @@ pub(super) enum Kind {
 
 /// A range of numbers; `above` leaves `low` itself out.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Range {
-    pub(super) low: f64,
-    pub(super) above: bool,
-    pub(super) high: f64,
+pub(crate) struct Range {
+    pub(crate) low: f64,
+    pub(crate) above: bool,
+    pub(crate) high: f64,
 }
 
-/// What a key accepts and how that is told to the user.
+/// What a key accepts, and how messages and comments put it.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Rule {
-    pub(super) kind: Kind,
+pub(crate) struct Rule {
+    pub(crate) kind: Kind,
     unit: &'static str,
     zero: &'static str,
 }
@@ -88,12 +88,12 @@ impl Rule {
     }
 
     /// A whole number, both ends included.
-    pub(super) const fn whole(low: u64, high: u64) -> Rule {
+    pub(crate) const fn whole(low: u64, high: u64) -> Rule {
         Rule::of(Kind::Whole { low, high })
     }
 
     /// A number, both ends included.
-    pub(super) const fn number(low: f64, high: f64) -> Rule {
+    pub(crate) const fn number(low: f64, high: f64) -> Rule {
         Rule::of(Kind::Number(Range {
             low,
             above: false,
@@ -102,12 +102,12 @@ impl Rule {
     }
 
     /// A finite number that is 0 or more, such as the weight of a term.
-    pub(super) const fn positive_or_zero() -> Rule {
+    pub(crate) const fn positive_or_zero() -> Rule {
         Rule::number(0.0, f64::INFINITY)
     }
 
     /// A number above 0 and at most `high`.
-    pub(super) const fn above_zero(high: f64) -> Rule {
+    pub(crate) const fn above_zero(high: f64) -> Rule {
         Rule::of(Kind::Number(Range {
             low: 0.0,
             above: true,
@@ -116,7 +116,7 @@ impl Rule {
     }
 
     /// A list of at least one number, each above 0 and at most `high`.
-    pub(super) const fn list_above_zero(high: f64) -> Rule {
+    pub(crate) const fn list_above_zero(high: f64) -> Rule {
         Rule::of(Kind::Numbers(Range {
             low: 0.0,
             above: true,
@@ -124,43 +124,52 @@ impl Rule {
         }))
     }
 
+    /// A list of at least one number, both ends included.
+    pub(crate) const fn list(low: f64, high: f64) -> Rule {
+        Rule::of(Kind::Numbers(Range {
+            low,
+            above: false,
+            high,
+        }))
+    }
+
     /// `true` or `false`.
-    pub(super) const fn flag() -> Rule {
+    pub(crate) const fn flag() -> Rule {
         Rule::of(Kind::Flag)
     }
 
     /// One of `words`.
-    pub(super) const fn word(words: &'static [&'static str]) -> Rule {
+    pub(crate) const fn word(words: &'static [&'static str]) -> Rule {
         Rule::of(Kind::Word(words))
     }
 
     /// The path of a file.
-    pub(super) const fn path() -> Rule {
+    pub(crate) const fn path() -> Rule {
         Rule::of(Kind::Path)
     }
 
     /// One of `words` or the path of a file.
-    pub(super) const fn word_or_path(words: &'static [&'static str]) -> Rule {
+    pub(crate) const fn word_or_path(words: &'static [&'static str]) -> Rule {
         Rule::of(Kind::WordOrPath(words))
     }
 
     /// The same rule for a quantity in this unit.
-    pub(super) const fn unit(self, unit: &'static str) -> Rule {
+    pub(crate) const fn unit(self, unit: &'static str) -> Rule {
         Rule { unit, ..self }
     }
 
     /// The same rule, where 0 does this.
-    pub(super) const fn zero(self, zero: &'static str) -> Rule {
+    pub(crate) const fn zero(self, zero: &'static str) -> Rule {
         Rule { zero, ..self }
     }
 
     /// Whether a value given on the command line may come without quotes.
-    pub(super) fn takes_text(&self) -> bool {
+    pub(crate) fn takes_text(&self) -> bool {
         matches!(self.kind, Kind::Word(_) | Kind::Path | Kind::WordOrPath(_))
     }
 
     /// The values allowed and what 0 does, as in "0 or more (0 turns volume preservation off)".
-    pub(super) fn allowed(&self) -> String {
+    pub(crate) fn allowed(&self) -> String {
         match self.zero {
             "" => self.range(),
             zero => format!("{} (0 {zero})", self.range()),
@@ -168,7 +177,7 @@ impl Rule {
     }
 
     /// The same with the unit, as it stands in a comment above the key.
-    pub(super) fn described(&self) -> String {
+    pub(crate) fn described(&self) -> String {
         let mut described = match self.unit {
             "" => self.range(),
             unit => format!("{unit}, {}", self.range()),
@@ -201,7 +210,7 @@ impl Rule {
     ///
     /// # Errors
     /// The end of a sentence that begins with "must be".
-    pub(super) fn admit(&self, found: &DeValue<'_>) -> Result<Value, String> {
+    pub(crate) fn admit(&self, found: &DeValue<'_>) -> Result<Value, String> {
         match self.kind {
             Kind::Whole { low, high } => {
                 let DeValue::Integer(digits) = found else {
@@ -288,7 +297,7 @@ impl fmt::Display for Range {
 }
 
 /// A misspelt word is not taken for a file: a path has a folder or an extension.
-pub(super) fn looks_like_path(text: &str) -> bool {
+pub(crate) fn looks_like_path(text: &str) -> bool {
     text.contains(['.', '/', std::path::MAIN_SEPARATOR])
 }
 
@@ -316,79 +325,4 @@ fn grouped(number: u64) -> String {
         grouped.push(digit);
     }
     grouped
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn admitted(rule: Rule, text: &str) -> Result<Value, String> {
-        rule.admit(DeValue::parse(text).expect("a TOML value").get_ref())
-    }
-
-    #[test]
-    fn an_integer_is_a_number_but_a_float_is_not_a_whole_number() {
-        assert_eq!(
-            admitted(Rule::number(0.0, 9.0), "3"),
-            Ok(Value::Number(3.0))
-        );
-        assert_eq!(admitted(Rule::whole(0, 20_000), "3.0").unwrap_err(), {
-            "a whole number from 0 to 20_000"
-        });
-    }
-
-    #[test]
-    fn infinities_and_what_overflows_single_precision_are_refused() {
-        for text in ["inf", "-inf", "nan", "1e999", "3.5e38"] {
-            let refused = admitted(Rule::positive_or_zero(), text).unwrap_err();
-            assert_eq!(
-                refused, "a finite number in single precision, 0 or more",
-                "{text}"
-            );
-        }
-        assert_eq!(
-            admitted(Rule::positive_or_zero(), "3e38"),
-            Ok(Value::Number(3e38))
-        );
-    }
-
-    #[test]
-    fn whole_numbers_come_in_every_notation_of_toml() {
-        for text in ["1_000", "0x3e8", "0b1111101000", "0o1750", "+1000"] {
-            assert_eq!(
-                admitted(Rule::whole(1, 9999), text),
-                Ok(Value::Whole(1000)),
-                "{text}"
-            );
-        }
-    }
-
-    #[test]
-    fn a_list_is_refused_for_one_bad_number_and_for_having_none() {
-        let rule = Rule::list_above_zero(10.0);
-        assert_eq!(
-            admitted(rule, "[1, 0.5]"),
-            Ok(Value::Numbers(vec![1.0, 0.5]))
-        );
-        for text in ["[]", "[1, 0]", "[1, \"2\"]", "[[1]]", "1"] {
-            let refused = admitted(rule, text).unwrap_err();
-            assert_eq!(
-                refused, "a list of numbers, each above 0 and at most 10",
-                "{text}"
-            );
-        }
-    }
-
-    #[test]
-    fn a_misspelt_word_is_not_taken_for_a_path() {
-        let rule = Rule::word_or_path(&["none", "same-vertices"]);
-        assert_eq!(
-            admitted(rule, "'pairs.csv'"),
-            Ok(Value::Text("pairs.csv".into()))
-        );
-        assert_eq!(
-            admitted(rule, "'same-vertex'").unwrap_err(),
-            "\"none\", \"same-vertices\" or the path of a file (folder/name.extension)"
-        );
-    }
 }

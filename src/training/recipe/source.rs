@@ -1,60 +1,19 @@
 //! Where the values of a recipe come from: the lines of a TOML file and the `--set` overrides,
 //! each value checked by its key's rule and remembered with its place.
 
-use std::collections::BTreeMap;
-use std::fmt;
 use std::ops::Range;
 use std::path::Path;
 
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+use super::data::{KEYFRAME, KEYFRAMES};
+use super::entry::{Entries, Entry, Place, keyframe_id, shortened};
 use super::error::RecipeError;
-use super::keys::{KEYS, PRESET, SECTIONS};
+use super::keys::PRESET;
 use super::rule::{Kind, Value};
 use super::schema::{Key, Section};
-use super::words::Preset;
-
-/// Values by key, such as "training.steps".
-pub(super) type Entries = BTreeMap<String, Entry>;
-
-/// A value and where it was given.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Entry {
-    pub(super) value: Value,
-    pub(super) place: Place,
-}
-
-/// Where a value was given.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) enum Place {
-    /// In a file, at this line.
-    Line { file: String, line: usize },
-    /// On the command line, in these words.
-    Override(String),
-    /// Nowhere: it is the preset's.
-    Preset(Preset),
-}
-
-impl Place {
-    /// The beginning of an error about this key: where, which key, and what was found there.
-    pub(super) fn about(&self, key: &str, found: &str) -> String {
-        match self {
-            Place::Override(_) => self.to_string(),
-            _ => format!("{self}: {key} = {found}"),
-        }
-    }
-}
-
-impl fmt::Display for Place {
-    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Place::Line { file, line } => write!(out, "{file}:{line}"),
-            Place::Override(given) => write!(out, "--set {given}"),
-            Place::Preset(preset) => write!(out, "preset \"{preset}\""),
-        }
-    }
-}
+use super::{catalogue, old, unknown};
 
 /// Text of a recipe and its name in messages.
 struct Text<'a> {
@@ -92,32 +51,35 @@ impl Text<'_> {
     }
 }
 
-/// The text on one line, without control characters, cut where it is long.
-fn shortened(text: &str) -> String {
-    const LONGEST: usize = 80;
-    let text = text.trim();
-    let mut cut: String = text
-        .chars()
-        .take(LONGEST)
-        .map(|letter| {
-            if letter.is_control() {
-                '\u{FFFD}'
-            } else {
-                letter
+/// How what no recipe has is taken.
+pub(super) enum Reading<'a> {
+    /// As an error.
+    Strict,
+    /// As what another version wrote: left out, with a note.
+    Stored(&'a mut Vec<String>),
+}
+
+impl Reading<'_> {
+    fn unknown(&mut self, error: RecipeError) -> Result<(), RecipeError> {
+        match self {
+            Reading::Strict => Err(error),
+            Reading::Stored(notes) => {
+                notes.push(format!("{error}; it is left out"));
+                Ok(())
             }
-        })
-        .collect();
-    if text.chars().nth(LONGEST).is_some() {
-        cut.push('…');
+        }
     }
-    cut
 }
 
 /// The values that a recipe's text gives.
 ///
 /// # Errors
 /// The first mistake of the text in the order of its lines.
-pub(super) fn read_text(text: &str, origin: &Path) -> Result<Entries, RecipeError> {
+pub(super) fn read_text(
+    text: &str,
+    origin: &Path,
+    reading: &mut Reading<'_>,
+) -> Result<Entries, RecipeError> {
     let text = Text {
         text,
         name: origin.display().to_string(),
@@ -127,8 +89,8 @@ pub(super) fn read_text(text: &str, origin: &Path) -> Result<Entries, RecipeErro
     for (name, value) in in_order(document.get_ref()) {
         let place = text.place(&name.span());
         if name.get_ref() == PRESET.field {
-            read_entry(&text, &PRESET, value, &mut entries)?;
-        } else if let Some(section) = SECTIONS.iter().find(|known| known.name == name.get_ref()) {
+            read_entry(&text, &PRESET, PRESET.id(), value, &mut entries)?;
+        } else if let Some(section) = section(name.get_ref()) {
             let table = value
                 .get_ref()
                 .as_table()
@@ -136,9 +98,9 @@ pub(super) fn read_text(text: &str, origin: &Path) -> Result<Entries, RecipeErro
                     at: place.about(section.name, &text.found(value.span())),
                     allowed: format!("a section: [{}] on a line of its own, once", section.name),
                 })?;
-            read_section(&text, section, table, &mut entries)?;
+            read_section(&text, section, table, reading, &mut entries)?;
         } else {
-            return Err(unknown_at_top(&place, name.get_ref(), value.get_ref()));
+            reading.unknown(unknown::at_top(&place, name.get_ref(), value.get_ref()))?;
         }
     }
     Ok(entries)
@@ -148,15 +110,51 @@ fn read_section(
     text: &Text<'_>,
     section: &Section,
     table: &DeTable<'_>,
+    reading: &mut Reading<'_>,
     entries: &mut Entries,
 ) -> Result<(), RecipeError> {
     for (name, value) in in_order(table) {
-        let Some(key) = find(section.name, name.get_ref()) else {
+        if (section.name, name.get_ref().as_ref()) == ("data", KEYFRAMES) {
+            read_keyframes(text, value, reading, entries)?;
+        } else if let Some((key, old)) = find(section.name, name.get_ref()) {
+            read_entry(text, key, key.id(), value, entries)?.old = old;
+        } else {
             let place = text.place(&name.span());
             let at = format!("{place}: {}.{}", section.name, shortened(name.get_ref()));
-            return Err(unknown_key(at, section.name, name.get_ref()));
-        };
-        read_entry(text, key, value, entries)?;
+            reading.unknown(unknown::key(at, section.name, name.get_ref()))?;
+        }
+    }
+    Ok(())
+}
+
+/// Reads every `[[data.keyframe]]`, under the names of [`keyframe_id`].
+fn read_keyframes(
+    text: &Text<'_>,
+    list: &Spanned<DeValue<'_>>,
+    reading: &mut Reading<'_>,
+    entries: &mut Entries,
+) -> Result<(), RecipeError> {
+    let refused = || RecipeError::Refused {
+        at: text
+            .place(&list.span())
+            .about("data.keyframe", &text.found(list.span())),
+        allowed: "a list: [[data.keyframe]] on a line of its own for each key frame".to_owned(),
+    };
+    let list = list.get_ref().as_array().ok_or_else(refused)?;
+    for (index, item) in list.iter().enumerate() {
+        let table = item.get_ref().as_table().ok_or_else(refused)?;
+        for (name, value) in in_order(table) {
+            if let Some(key) = KEYFRAME.iter().find(|key| key.name() == **name.get_ref()) {
+                read_entry(text, key, keyframe_id(index, key), value, entries)?;
+            } else {
+                let at = format!(
+                    "{}: data.keyframe.{}",
+                    text.place(&name.span()),
+                    shortened(name.get_ref())
+                );
+                reading.unknown(unknown::key(at, "data.keyframe", name.get_ref()))?;
+            }
+        }
     }
     Ok(())
 }
@@ -172,25 +170,29 @@ pub(super) fn read_override(given: &str, entries: &mut Entries) -> Result<(), Re
     let (id, value) = given.split_once('=').ok_or_else(malformed)?;
     let (id, value) = (id.trim(), value.trim());
     let place = Place::Override(shortened(given));
-    let key = if id == PRESET.field {
-        &PRESET
+    let (key, old) = if id == PRESET.field {
+        (&PRESET, None)
     } else {
-        let (section, name) = id.split_once('.').ok_or_else(malformed)?;
-        if !SECTIONS.iter().any(|known| known.name == section) {
-            return Err(unknown_section(place.to_string(), section));
+        let (in_section, name) = id.split_once('.').ok_or_else(malformed)?;
+        if section(in_section).is_none() {
+            return Err(unknown::section(place.to_string(), in_section));
         }
-        find(section, name).ok_or_else(|| unknown_key(place.to_string(), section, name))?
+        find(in_section, name).ok_or_else(|| unknown::key(place.to_string(), in_section, name))?
     };
     let parsed = DeValue::parse(value).map(Spanned::into_inner);
     let parsed = match parsed {
         Ok(DeValue::String(text)) => DeValue::String(text),
         _ if key.rule.takes_text() => DeValue::String(value.into()),
         Ok(other) => other,
-        Err(_) => return Err(refused(&place, key, value, key.rule.allowed())),
+        Err(_) => return Err(refused(&place, &key.id(), value, key.rule.allowed())),
     };
     let admitted = key.rule.admit(&parsed);
-    let value = admitted.map_err(|allowed| refused(&place, key, value, allowed))?;
-    entries.insert(key.id(), Entry { value, place });
+    let value = admitted.map_err(|allowed| refused(&place, &key.id(), value, allowed))?;
+    let entry = Entry {
+        old,
+        ..Entry::new(key, value, place)
+    };
+    entries.insert(key.id(), entry);
     Ok(())
 }
 
@@ -199,18 +201,14 @@ pub(super) fn read_override(given: &str, entries: &mut Entries) -> Result<(), Re
 /// # Errors
 /// If an absolute path cannot be told or is not Unicode.
 pub(super) fn make_paths_absolute(entries: &mut Entries, folder: &Path) -> Result<(), RecipeError> {
-    for key in KEYS {
-        if !matches!(key.rule.kind, Kind::Path | Kind::WordOrPath(_)) {
-            continue;
-        }
-        let Some(Entry {
-            value: Value::Text(text),
-            ..
-        }) = entries.get_mut(&key.id())
-        else {
-            continue;
+    for Entry { key, value, .. } in entries.values_mut() {
+        let words = match key.rule.kind {
+            Kind::Path => &[],
+            Kind::WordOrPath(words) => words,
+            _ => continue,
         };
-        if matches!(key.rule.kind, Kind::WordOrPath(words) if words.contains(&text.as_str())) {
+        let Value::Text(text) = value else { continue };
+        if words.contains(&text.as_str()) {
             continue;
         }
         let path = folder.join(&*text);
@@ -246,29 +244,39 @@ fn in_order<'a, 'i>(
     entries
 }
 
-fn find(section: &str, name: &str) -> Option<&'static Key> {
-    KEYS.iter()
-        .find(|key| key.section == section && key.name() == name)
+fn section(name: &str) -> Option<&'static Section> {
+    let mut sections = catalogue::sections().iter().copied();
+    sections.find(|known| known.name == name)
 }
 
-fn read_entry(
+/// The key of this name, present or of an earlier version, and its old name if it has moved.
+fn find(section: &str, name: &str) -> Option<(&'static Key, Option<&'static str>)> {
+    let present = catalogue::find(section, name).map(|key| (key, None));
+    let moved = || old::moved(section, name).map(|(old, key)| (key, Some(old)));
+    let gone = || old::gone(section, name).map(|key| (key, None));
+    present.or_else(moved).or_else(gone)
+}
+
+fn read_entry<'a>(
     text: &Text<'_>,
-    key: &Key,
+    key: &'static Key,
+    id: String,
     found: &Spanned<DeValue<'_>>,
-    entries: &mut Entries,
-) -> Result<(), RecipeError> {
+    entries: &'a mut Entries,
+) -> Result<&'a mut Entry, RecipeError> {
     let place = text.place(&found.span());
     let value = key
         .rule
         .admit(found.get_ref())
-        .map_err(|allowed| refused(&place, key, &text.found(found.span()), allowed))?;
-    entries.insert(key.id(), Entry { value, place });
-    Ok(())
+        .map_err(|allowed| refused(&place, &key.id(), &text.found(found.span()), allowed))?;
+    let entry = Entry::new(key, value, place);
+    entries.insert(id.clone(), entry);
+    Ok(entries.get_mut(&id).expect("it was put in just now"))
 }
 
-fn refused(place: &Place, key: &Key, found: &str, allowed: String) -> RecipeError {
+fn refused(place: &Place, id: &str, found: &str, allowed: String) -> RecipeError {
     RecipeError::Refused {
-        at: place.about(&key.id(), found),
+        at: place.about(id, found),
         allowed,
     }
 }
@@ -281,80 +289,5 @@ fn not_toml(text: &Text<'_>, error: &toml::de::Error) -> RecipeError {
         at: format!("{}:{line}", text.name),
         reason: error.message().replace('\n', ", "),
         line: shortened(text.text.lines().nth(line - 1).unwrap_or_default()),
-    }
-}
-
-/// A name above all sections that is none: a section misspelt or a key out of its place.
-fn unknown_at_top(place: &Place, name: &str, value: &DeValue<'_>) -> RecipeError {
-    if value.is_table() || value.is_array() {
-        return unknown_section(format!("{place}: [{}]", shortened(name)), name);
-    }
-    unknown_key(format!("{place}: {}", shortened(name)), "", name)
-}
-
-fn unknown_section(at: String, name: &str) -> RecipeError {
-    let sections: Vec<&str> = SECTIONS.iter().map(|section| section.name).collect();
-    let hint = nearest(name, sections.iter().copied())
-        .map_or_else(String::new, |near| format!("; did you mean {near}?"));
-    RecipeError::Unknown {
-        at,
-        what: "section",
-        hint,
-        known: format!("a recipe has {}", sections.join(", ")),
-    }
-}
-
-fn unknown_key(at: String, section: &str, name: &str) -> RecipeError {
-    let names: Vec<String> = match section {
-        "" => vec![PRESET.name()],
-        _ => KEYS
-            .iter()
-            .filter(|key| key.section == section)
-            .map(Key::name)
-            .collect(),
-    };
-    let at_home: Vec<String> = KEYS
-        .iter()
-        .filter(|key| key.name() == name)
-        .map(|key| format!("[{}]", key.section))
-        .collect();
-    let hint = if !at_home.is_empty() {
-        format!("; it belongs in {}", at_home.join(" or "))
-    } else if let Some(near) = nearest(name, names.iter().map(String::as_str)) {
-        format!("; did you mean {near}?")
-    } else {
-        String::new()
-    };
-    let home = match section {
-        "" => "above all sections stands".to_owned(),
-        _ => format!("[{section}] has"),
-    };
-    RecipeError::Unknown {
-        at,
-        what: "key",
-        hint,
-        known: format!("{home} {}", names.join(", ")),
-    }
-}
-
-/// The known name that is most like the one given, if one is like it at all.
-fn nearest<'a>(given: &str, known: impl Iterator<Item = &'a str>) -> Option<&'a str> {
-    const ALIKE: f64 = 0.7;
-    let given = given.to_lowercase().replace('_', "-");
-    known
-        .map(|name| (strsim::jaro_winkler(&given, name), name))
-        .filter(|(likeness, _)| *likeness >= ALIKE)
-        .max_by(|one, other| one.0.total_cmp(&other.0))
-        .map(|(_, name)| name)
-}
-
-/// The word of the preset that the entries name.
-pub(super) fn preset(entries: &Entries) -> Preset {
-    match entries.get(PRESET.field) {
-        Some(Entry {
-            value: Value::Text(word),
-            ..
-        }) => Preset::from_word(word).expect("the preset has passed its rule"),
-        _ => Preset::Default,
     }
 }

@@ -1,10 +1,14 @@
-//! The keys that choose between words, as enums: `words!` gives each its spelling in the recipe.
+//! The keys that choose between words, as enums: `words!` gives each its spelling in the recipe,
+//! `words_of!` gives one to enums of the model.
 
 use std::fmt;
 use std::path::PathBuf;
 
+use isomorph_model::operators::Derivatives;
+use isomorph_model::trajectory::Integrator;
+
 use super::rule::{Value, looks_like_path};
-use super::schema::Setting;
+use super::setting::Setting;
 
 /// Declares enums whose variants are words of the recipe.
 macro_rules! words {
@@ -45,45 +49,25 @@ macro_rules! words {
                 match value { Value::Text(word) => $Name::from_word(&word), _ => None }
             }
 
-            fn to_value(&self) -> Value {
-                Value::Text(self.word().to_owned())
+            fn to_value(&self) -> Option<Value> {
+                Some(Value::Text(self.word().to_owned()))
             }
         }
     )+ };
 }
 
 words! {
-    /// The values that every key left out of a recipe falls back to.
+    /// Values of all keys that a recipe does not give.
     Preset {
         /// A first result within minutes on a CPU.
         Quick = "quick",
         /// The balance of quality and time that the project recommends.
         Default = "default",
-        /// The best that the method gives, for those who can wait.
+        /// The best results, and slow.
         Quality = "quality",
         /// The paper's networks, weights and schedule, with the least corrections that make
         /// them work.
         Paper = "paper",
-    }
-
-    /// What is trained.
-    MethodName {
-        /// `f(x, t)` carried by `V`: the paper's method and ours.
-        VelocityField = "velocity-field",
-        /// `f(x, t)` fitted at t = 0 and t = 1 only.
-        Mlp = "mlp",
-        /// `(1 - t) g + t h` of the two distance fields.
-        SdfBlend = "sdf-blend",
-        /// `f(x, t)` with a small Lipschitz constant (Liu et al. 2022).
-        Lipmlp = "lipmlp",
-        /// `f(x, t)` under a level-set equation between its ends (Novello et al. 2023).
-        Nise = "nise",
-        /// The same with an interpolated velocity.
-        NiseVelocity = "nise-velocity",
-        /// A divergence-free flow in a sine basis (Eisenberger et al. 2019).
-        Eigenbasis = "eigenbasis",
-        /// Invertible deformations, one per time (Yang et al. 2021).
-        Nfgp = "nfgp",
     }
 
     /// Where the normals of the shapes come from.
@@ -113,6 +97,7 @@ words! {
         /// Two end fields, carried by the flow of `V`.
         Flow = "flow",
     }
+
     /// The form of the level-set equation.
     LevelSetForm {
         /// Modified: `f_t + V.grad f + lambda_l f R = 0`, `R = -<J n, n>`.
@@ -129,16 +114,6 @@ words! {
         Step = "step",
     }
 
-    /// The method that integrates trajectories.
-    Integrator {
-        /// Forward Euler, first order, one evaluation of V a step.
-        Euler = "euler",
-        /// Explicit midpoint, second order, two evaluations.
-        Midpoint = "midpoint",
-        /// Classical Runge-Kutta, fourth order, four evaluations.
-        Rk4 = "rk4",
-    }
-
     /// The times at which the terms between the shapes are sampled.
     TimeSampling {
         /// Uniform in [0, 1], with a share exactly at both ends.
@@ -146,14 +121,36 @@ words! {
         /// The multiples of `1 / time-steps`.
         Grid = "grid",
     }
+}
 
-    /// How the derivatives of the networks by their inputs are taken.
-    Derivatives {
-        /// Repeated reverse-mode differentiation.
-        Nested = "nested",
-        /// One forward sweep that carries value, tangents and Laplacian.
-        Forward = "forward",
-    }
+/// Spells enums of the model in the recipe.
+macro_rules! words_of {
+    ($( $Name:ident as $WORDS:ident { $( $Variant:ident = $word:literal, )+ } )+) => { $(
+        #[doc = concat!("The words of a recipe for [`", stringify!($Name), "`].")]
+        pub const $WORDS: &[&str] = &[$($word),+];
+
+        impl Setting for $Name {
+            fn from_value(value: Value) -> Option<$Name> {
+                match value {
+                    Value::Text(word) => match word.as_str() {
+                        $( $word => Some($Name::$Variant), )+
+                        _ => None,
+                    },
+                    _ => None,
+                }
+            }
+
+            fn to_value(&self) -> Option<Value> {
+                let word = match self { $( $Name::$Variant => $word, )+ };
+                Some(Value::Text(word.to_owned()))
+            }
+        }
+    )+ };
+}
+
+words_of! {
+    Integrator as INTEGRATORS { Euler = "euler", Midpoint = "midpoint", Rk4 = "rk4", }
+    Derivatives as DERIVATIVES { Nested = "nested", Forward = "forward", }
 }
 
 /// Which points of the two shapes are known to correspond.
@@ -170,7 +167,7 @@ pub enum Correspondences {
 }
 
 impl Correspondences {
-    pub(super) const WORDS: &'static [&'static str] = &["none", "same-vertices", "match"];
+    pub(crate) const WORDS: &'static [&'static str] = &["none", "same-vertices", "match"];
 }
 
 impl Setting for Correspondences {
@@ -186,8 +183,8 @@ impl Setting for Correspondences {
         }
     }
 
-    fn to_value(&self) -> Value {
-        Value::Text(match self {
+    fn to_value(&self) -> Option<Value> {
+        Some(Value::Text(match self {
             Correspondences::None => "none".to_owned(),
             Correspondences::SameVertices => "same-vertices".to_owned(),
             Correspondences::Match => "match".to_owned(),
@@ -196,6 +193,6 @@ impl Setting for Correspondences {
                 text if looks_like_path(&text) => text.into_owned(),
                 text => format!("./{text}"),
             },
-        })
+        }))
     }
 }

@@ -1,22 +1,25 @@
-//! What each method trains, keeps and misses.
+//! What each method trains, keeps and lacks.
 
-use burn::module::ParamId;
+use burn::tensor::Tensor;
 
+use super::samples::first_layer;
 use super::*;
+use crate::method::{self, fixed_change, names, spec_of};
 
 #[test]
 fn the_end_fields_of_a_flow_train_in_every_step_and_its_velocity_as_the_schedule_says() {
-    let digest = |learner: &Learner<B>| {
-        let files = learner.method().records().expect("encodes").0;
+    let digest = |method: &dyn Method<B>| {
+        let files = networks(method);
         let named = |name: &str| files.iter().find(|(file, _)| file == name).cloned();
         let [ends, velocity] = ["ends.mpk", "velocity.mpk"].map(named);
         (ends.expect("g and h"), velocity.expect("V"))
     };
-    let mut learner = learner(&[FLOW]);
+    let data = data();
+    let mut method = build(&recipe(&[FLOW]), &data);
     for step in 0..10 {
-        let (ends, v) = digest(&learner);
-        learner.advance(false);
-        let (next_ends, next_v) = digest(&learner);
+        let (ends, v) = digest(&*method);
+        advance(&mut *method, &data, step);
+        let (next_ends, next_v) = digest(&*method);
         assert_ne!(ends, next_ends, "the end fields in step {step}");
         assert_eq!(v != next_v, step < 7, "V in step {step}");
     }
@@ -24,21 +27,15 @@ fn the_end_fields_of_a_flow_train_in_every_step_and_its_velocity_as_the_schedule
 
 #[test]
 fn the_surface_term_of_a_flow_moves_its_velocity_and_leaves_the_end_fields_alone() {
+    let data = data();
     let gradients = |on_surface: &str| {
-        let learner = learner(&[
-            FLOW,
-            "training.ramp-until=0",
-            "training.warm-up=0",
-            on_surface,
-        ]);
-        let posed = learner.method.objective(&learner.data, 5, Part::WHOLE);
-        let (terms, gradients) = posed.solve(1, true);
+        let early = ["training.ramp-until=0", "training.warm-up=0"];
+        let recipe = recipe(&[&[FLOW, on_surface], &early[..]].concat());
+        let method = build(&recipe, &data);
+        let drawn = method.draw(&data, 5);
+        let (terms, gradients) = solve(&*method, &data, &drawn, 5, Part::WHOLE);
         let has = terms.iter().any(|term| term.name == "on-surface");
-        let first = |network: usize| {
-            let of = gradients[network].get::<NdArray, 2>(ParamId::from(1));
-            let data = of.expect("of the first layer").into_data();
-            data.to_vec::<f32>().expect("f32")
-        };
+        let first = |network: usize| first_layer(&gradients[network]).expect("of the first layer");
         (has, first(0), first(1))
     };
     let (with, ends, v) = gradients("loss.on-surface=100");
@@ -48,63 +45,47 @@ fn the_surface_term_of_a_flow_moves_its_velocity_and_leaves_the_end_fields_alone
     assert_ne!(v, bare_v);
 }
 
-/// Every method by name, ours with both geometries.
-fn methods() -> impl Iterator<Item = String> {
-    let names = crate::recipe::MethodName::WORDS.iter();
-    let named = names.map(|name| format!("method.name={name}"));
-    named.chain([FLOW.to_owned()])
-}
-
-/// Small settings of what only some methods have.
-const SMALL: [&str; 3] = ["method.modes=2", "method.deformations=2", "method.blocks=1"];
-
 #[test]
 fn every_method_trains_and_resumes_to_the_same_weights() {
-    for name in methods() {
-        let extra = [&SMALL[..], &[name.as_str()]].concat();
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        let mut whole = learner(&extra);
-        let events = train(&mut whole, folder.path(), None);
-        let totals: Vec<f64> = events
-            .iter()
-            .filter_map(|event| match event {
-                Event::Step(report) => Some(report.total),
-                _ => None,
-            })
-            .collect();
-        assert_eq!(totals.len(), 10, "{name}");
-        assert!(
-            totals.iter().all(|total| total.is_finite()),
-            "{name}: {totals:?}"
-        );
-        let (_, eighth) = checkpoint::list(folder.path()).remove(0);
-        let checkpoint = Checkpoint::open(&eighth).expect("after step 8");
-        let again = Learner::<B>::resume(recipe(&extra), pair(), Default::default(), &checkpoint);
-        let mut again = again.expect("resumes");
-        again.advance(false);
-        again.advance(false);
-        // Without the optimisers, whose records list the same states in an order of their own.
-        let networks = |learner: &Learner<B>| {
-            let mut files = learner.method().records().expect("encodes").0;
-            files.retain(|(file, _)| !file.ends_with("-optimiser.mpk"));
-            files
-        };
+    for spec in METHODS {
+        let (data, name) = (data(), spec.described());
+        let recipe = recipe_of(spec, &[]);
+        let mut whole = build(&recipe, &data);
+        let mut eighth = None;
+        for step in 0..10 {
+            if step == 8 {
+                eighth = Some(whole.records().expect("encodes"));
+            }
+            let terms = advance(&mut *whole, &data, step);
+            assert!(
+                !terms.is_empty() && terms.iter().all(|term| term.raw.is_finite()),
+                "{name}, step {step}: {terms:?}"
+            );
+        }
+        let mut again = build(&recipe, &data);
+        again
+            .restore(&eighth.expect("after step 8"))
+            .expect("records of the same method");
+        advance(&mut *again, &data, 8);
+        advance(&mut *again, &data, 9);
         // Bit for bit: the products are too small for more than one thread.
-        assert!(networks(&whole) == networks(&again), "{name}");
+        assert!(networks(&*whole) == networks(&*again), "{name}");
     }
 }
 
 #[test]
 fn every_method_has_a_surface_or_moves_points() {
-    for name in methods() {
-        let learner = learner(&[&SMALL[..], &[name.as_str()]].concat());
+    for spec in METHODS {
+        let (data, name) = (data(), spec.described());
+        let method = build(&recipe_of(spec, &[]), &data);
         let x = || {
             crate::tensors::rows::<NdArray, 3>(&[[0.3, 0.0, 0.1], [0.0; 3]], &Default::default())
         };
-        let t = burn::tensor::Tensor::full([2, 1], 0.5, &Default::default());
-        let geometry = learner.method().geometry();
-        let motion = learner.method().motion();
+        let t = Tensor::full([2, 1], 0.5, &Default::default());
+        let (geometry, motion) = (method.geometry(), method.motion());
         assert!(geometry.is_some() || motion.is_some(), "{name}");
+        // Without a surface of its own it moves the source's.
+        assert_eq!(geometry.is_none(), spec.needs.mesh, "{name}");
         if let Some(f) = geometry {
             assert_eq!(f.value(x(), t.clone()).dims(), [2, 1], "{name}");
             assert_eq!(f.gradient(x(), t).dims(), [2, 3], "{name}");
@@ -116,25 +97,80 @@ fn every_method_has_a_surface_or_moves_points() {
 }
 
 #[test]
-fn a_method_says_what_it_misses() {
-    let refused = |extra: &[&str], pair: Pair| {
-        let learner = Learner::<B>::new(recipe(extra), pair, Default::default());
-        learner.err().expect("refused").to_string()
-    };
-    let mut bare = pair();
-    bare.source.normals = None;
-    let text = refused(&["method.name=lipmlp"], bare);
-    assert!(
-        text.contains("lipmlp") && text.contains("data.normals"),
-        "{text}"
-    );
-    for name in ["eigenbasis", "nfgp"] {
-        let mut unmatched = pair();
-        unmatched.correspondences.clear();
-        let text = refused(&[&format!("method.name={name}")], unmatched);
-        assert!(
-            text.contains(name) && text.contains("data.correspondences"),
-            "{text}"
-        );
+fn a_method_says_what_it_lacks() {
+    for spec in METHODS {
+        let recipe = recipe_of(spec, &[]);
+        let (mut bare, mut unmatched) = (data(), data());
+        bare.keys[0].normals = None;
+        unmatched.between[0].clear();
+        for (data, needed, key) in [
+            (data(), false, ""),
+            (bare, spec.needs.normals, "data.normals"),
+            (
+                unmatched,
+                spec.needs.correspondences,
+                "data.correspondences",
+            ),
+        ] {
+            match method::check(&recipe, &data) {
+                Ok(()) => assert!(!needed, "{}", spec.name),
+                Err(text) => {
+                    assert!(needed, "{text}");
+                    assert!(text.contains(spec.name) && text.contains(key), "{text}");
+                }
+            }
+        }
     }
+}
+
+#[test]
+fn the_list_of_methods_has_every_name_and_finds_each_method_again() {
+    let wanted = [
+        "velocity-field",
+        "mlp",
+        "sdf-blend",
+        "lipmlp",
+        "nise",
+        "nise-velocity",
+        "eigenbasis",
+        "nfgp",
+    ];
+    assert_eq!(names(), wanted);
+    for spec in METHODS {
+        assert_eq!(spec_of(&recipe_of(spec, &[])), *spec);
+        assert!(!spec.about.is_empty() && !spec.citation.is_empty());
+        // What a comparison changes is a recipe of that method.
+        let set = spec.compare_overrides();
+        let text = "preset = \"quick\"\n[data]\nsource = \"a.ply\"\ntarget = \"b.ply\"\n\
+                    correspondences = \"same-vertices\"\n";
+        let recipe = Recipe::parse(text, Path::new("recipe.toml"), &set).expect(spec.name);
+        assert_eq!(spec_of(&recipe), *spec);
+    }
+}
+
+#[test]
+fn a_run_that_has_begun_keeps_its_method_its_networks_and_what_is_shared_out() {
+    let key = |before: &[&str], after: &[&str]| {
+        let change = fixed_change(&recipe(before), &recipe(after));
+        change.map(|(change, why)| {
+            assert!(!why.is_empty());
+            change.key
+        })
+    };
+    let nise = "method.name=nise";
+    assert_eq!(key(&[], &["training.steps=20", "loss.strain=1"]), None);
+    assert_eq!(key(&[], &[nise]).as_deref(), Some("method.name"));
+    assert_eq!(
+        key(&[FLOW], &[NETWORK]).as_deref(),
+        Some("implicit.geometry")
+    );
+    assert_eq!(
+        key(&[], &["velocity.width=9"]).as_deref(),
+        Some("velocity.width")
+    );
+    assert_eq!(key(&[nise], &[nise, "nise.residual=1"]), None);
+    let steps = key(&[nise], &[nise, "training.steps=20"]);
+    assert_eq!(steps.as_deref(), Some("training.steps"));
+    let omega = key(&[nise], &[nise, "nise.omega=9"]);
+    assert_eq!(omega.as_deref(), Some("nise.omega"));
 }

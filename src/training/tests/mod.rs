@@ -1,23 +1,34 @@
-//! The learner on small spheres: batches, the loop, what each method trains.
+//! Methods on small spheres: their samples, what each trains, which keys act.
 
-mod batch;
-mod looped;
+mod acting;
 mod methods;
+mod samples;
 
-use std::sync::atomic::AtomicBool;
+use std::path::Path;
 
+use burn::optim::GradientsParams;
 use burn_autodiff::Autodiff;
 use burn_ndarray::NdArray;
 
-use super::*;
+use crate::data::TrainingData;
+use crate::engine::{AllMethods, MethodSet};
+use crate::method::{METHODS, Method, MethodSpec};
+use crate::posed::{self, Slopes};
+use crate::recipe::Recipe;
+use crate::report::TermReport;
+use crate::samples::{Drawn, Part};
 
 type B = Autodiff<NdArray>;
 
+/// The default method and the paper's.
+const FLOW: &str = "implicit.geometry=flow";
+const NETWORK: &str = "implicit.geometry=network";
+
+/// A small recipe with these changes; what of it does nothing in the changed method is dropped.
 fn recipe(extra: &[&str]) -> Recipe {
     let text = "preset = \"quick\"\n[data]\nsource = \"a.ply\"\ntarget = \"b.ply\"\n";
     let small = [
         "data.correspondences=same-vertices",
-        "implicit.geometry=network",
         "implicit.activation=softplus",
         "implicit.beta=100",
         "training.velocity-until=0.7",
@@ -30,43 +41,71 @@ fn recipe(extra: &[&str]) -> Recipe {
         "training.batch=88",
         "training.correspondence-batch=8",
         "training.steps=10",
-        "training.log-every=1",
-        "checkpoint.every=4",
-        "checkpoint.keep=2",
     ];
-    let set: Vec<String> = small
-        .iter()
-        .chain(extra)
-        .map(|text| (*text).to_owned())
-        .collect();
-    Recipe::parse(text, Path::new("recipe.toml"), &set).expect("a valid recipe")
+    let small = small.map(str::to_owned);
+    let mut recipe = Recipe::parse(text, Path::new("recipe.toml"), &small).expect("a recipe");
+    let extra: Vec<String> = extra.iter().map(|text| (*text).to_owned()).collect();
+    recipe.with_all(&extra).expect("changes of it");
+    recipe
+}
+
+/// What makes the small recipe this method, with few modes and deformations.
+fn overrides(spec: &MethodSpec) -> Vec<String> {
+    let mut overrides = vec![format!("method.name={}", spec.name)];
+    overrides.extend(
+        spec.geometry
+            .map(|kind| format!("implicit.geometry={kind}")),
+    );
+    let small = match spec.name {
+        "eigenbasis" => &["eigenbasis.modes=2"][..],
+        "nfgp" => &["nfgp.deformations=2", "nfgp.blocks=1"],
+        _ => &[],
+    };
+    overrides.extend(small.iter().map(|text| (*text).to_owned()));
+    overrides
+}
+
+/// The small recipe of a method with these changes.
+fn recipe_of(spec: &MethodSpec, extra: &[&str]) -> Recipe {
+    let own = overrides(spec);
+    let own = own.iter().map(String::as_str);
+    recipe(&own.chain(extra.iter().copied()).collect::<Vec<_>>())
 }
 
 /// Points of two spheres, the second moved along x.
-fn pair() -> Pair {
-    Pair::spheres(200, 200)
+fn data() -> TrainingData {
+    TrainingData::spheres(200, 200)
 }
 
-/// A learner of the small recipe with these changes, on two spheres.
-fn learner(extra: &[&str]) -> Learner<B> {
-    Learner::new(recipe(extra), pair(), Default::default()).expect("the spheres have all it needs")
+fn build(recipe: &Recipe, data: &TrainingData) -> Box<dyn Method<B>> {
+    let built = AllMethods::build::<B>(recipe, &data.bounds, &Default::default());
+    built.expect("all methods are among them")
 }
 
-/// Our method with the other geometry.
-const FLOW: &str = "implicit.geometry=flow";
+/// The terms and gradients of one part of a step's samples.
+fn solve(
+    method: &dyn Method<B>,
+    data: &TrainingData,
+    drawn: &Drawn,
+    step: usize,
+    part: Part,
+) -> (Vec<TermReport>, Vec<GradientsParams>) {
+    let posed = method.objective(data, &drawn.part(part), step);
+    posed.solve(part.of, true)
+}
 
-/// Trains in a folder until done or until `stop_after` steps; the events.
-fn train(learner: &mut Learner<B>, folder: &Path, stop_after: Option<usize>) -> Vec<Event> {
-    let (stop, mut events) = (AtomicBool::new(false), Vec::new());
-    let mut emit = |event: Event| {
-        if let Event::Tick { step } = event {
-            stop.store(Some(step) == stop_after, Ordering::Relaxed);
-        }
-        events.push(event);
-        Ok(())
-    };
-    learner
-        .run(folder, &stop, &mut emit)
-        .expect("a small run trains");
-    events
+/// Makes one step, undivided; the terms.
+fn advance(method: &mut dyn Method<B>, data: &TrainingData, step: usize) -> Vec<TermReport> {
+    let drawn = method.draw(data, step);
+    let (terms, gradients) = solve(method, data, &drawn, step, Part::WHOLE);
+    method.descend(step, &mut Slopes::new(vec![gradients]));
+    terms
+}
+
+/// The records of the networks, without those of the optimisers, which list the same states in an order of
+/// their own.
+fn networks(method: &dyn Method<B>) -> Vec<(String, Vec<u8>)> {
+    let mut files = method.records().expect("encodes").0;
+    files.retain(|(file, _)| !file.ends_with("-optimiser.mpk"));
+    files
 }

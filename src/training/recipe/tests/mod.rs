@@ -1,12 +1,20 @@
-//! The recipe from outside: presets, paths and overrides here; the range of every key in `ranges`,
-//! the text of every mistake in `messages`, and what reads back from print in `round_trip`.
+//! The recipe from outside: presets, paths, overrides and changes here. The range of every key stands
+//! in `ranges`, the text of every mistake in `messages`, keys that do nothing in `acting`, what reads back
+//! from print in `round_trip`, the recipe of `init` in `init`, those of earlier versions in `stored`, and
+//! key frames in `frames`.
 
+mod acting;
+mod frames;
+mod init;
 mod messages;
 mod ranges;
 mod round_trip;
+mod rule;
+mod stored;
 
 use std::path::Path;
 
+use super::schema::Key;
 use super::*;
 
 const SHAPES: &str = "[data]\nsource = \"/s.ply\"\ntarget = \"/t.ply\"\n";
@@ -29,9 +37,9 @@ fn an_override_of_a_text_needs_no_quotes() {
     ] {
         let recipe = parsed(SHAPES, &[given]).expect(given);
         assert!(
-            recipe.data.source.ends_with("2024"),
+            recipe.data.source().ends_with("2024"),
             "{given}: {:?}",
-            recipe.data.source
+            recipe.data.source()
         );
     }
 }
@@ -40,14 +48,14 @@ fn an_override_of_a_text_needs_no_quotes() {
 fn paths_are_relative_to_the_recipe() {
     let text = "[data]\nsource = \"a.ply\"\ntarget = \"/b.ply\"\ncorrespondences = \"c/d.csv\"";
     let recipe = Recipe::parse(text, Path::new("/runs/fox/recipe.toml"), &[]).expect("a recipe");
-    assert_eq!(recipe.data.source, Path::new("/runs/fox/a.ply"));
-    assert_eq!(recipe.data.target, Path::new("/b.ply"));
+    assert_eq!(recipe.data.source(), Path::new("/runs/fox/a.ply"));
+    assert_eq!(recipe.data.target(), Path::new("/b.ply"));
     let pairs = Correspondences::File("/runs/fox/c/d.csv".into());
-    assert_eq!(recipe.data.correspondences, pairs);
+    assert_eq!(recipe.data.between, [pairs]);
     // A recipe in the working directory has a parent of no name.
     let here = std::env::current_dir().expect("a working directory");
     let recipe = parsed("[data]\nsource = \"a.ply\"\ntarget = \"b.ply\"", &[]).expect("a recipe");
-    assert_eq!(recipe.data.source, here.join("a.ply"));
+    assert_eq!(recipe.data.source(), here.join("a.ply"));
 }
 
 /// The numbers are those that the paper prints.
@@ -107,6 +115,54 @@ fn changes_name_the_key_and_both_values() {
             "training.steps: 1000 -> 2000"
         ]
     );
-    let networks: Vec<bool> = changes.iter().map(Change::is_of_a_network).collect();
-    assert_eq!(networks, [false, true, false]);
+    // Between methods what only one of them has stands with "nothing" for the other.
+    let other = parsed(SHAPES, &["preset=quick", "method.name=nise"]).expect("a recipe");
+    let told: Vec<String> = before
+        .changes(&other)
+        .iter()
+        .map(Change::to_string)
+        .collect();
+    assert!(
+        told.contains(&"nise.omega: nothing -> 20".to_owned()),
+        "{told:?}"
+    );
+    assert!(
+        told.contains(&"velocity.width: 96 -> nothing".to_owned()),
+        "{told:?}"
+    );
+}
+
+#[test]
+fn two_shapes_alone_make_the_default_recipe_with_absolute_paths() {
+    let recipe = Recipe::between(Path::new("a.ply"), Path::new("/b.ply")).expect("a recipe");
+    let here = std::env::current_dir().expect("a working directory");
+    let set = format!("data.source={}", here.join("a.ply").display());
+    assert_eq!(
+        recipe,
+        parsed(SHAPES, &[&set, "data.target=/b.ply"]).expect("a recipe")
+    );
+}
+
+#[test]
+fn a_changed_key_leaves_the_others_and_drops_what_the_new_method_does_not_use() {
+    let mut recipe = parsed(SHAPES, &["loss.strain=5", "training.steps=7"]).expect("a recipe");
+    recipe.with("training.batch=70").expect("a change");
+    assert_eq!((recipe.training.batch, recipe.training.steps), (70, 7));
+    let before = recipe.clone();
+    let told = recipe
+        .with("loss.level-set=3")
+        .expect_err("idle")
+        .to_string();
+    assert!(
+        told.starts_with("--set loss.level-set=3: does nothing"),
+        "{told}"
+    );
+    assert_eq!(recipe, before);
+    let both = ["training.warm-up=0.9", "training.ramp-until=0.95"].map(str::to_owned);
+    assert!(recipe.with(&both[0]).is_err(), "beyond the ramp");
+    recipe.with_all(&both).expect("together they are a recipe");
+    recipe.with("method.name=mlp").expect("another method");
+    assert_eq!(recipe.training.steps, 7);
+    // The preset's again, as nothing reads it.
+    assert_eq!(recipe.loss.strain, preset("default").loss.strain);
 }

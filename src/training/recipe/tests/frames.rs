@@ -1,0 +1,162 @@
+//! Key frames: their three forms, and what can be wrong with them.
+
+use super::*;
+
+const THREE: &str = r#"
+[data]
+points = 100
+correspondences = "same-vertices"
+[[data.keyframe]]
+file = "a.ply"
+time = 0
+[[data.keyframe]]
+file = "/b.ply"
+time = 12.5
+correspondences = "b-to-c.csv"
+[[data.keyframe]]
+file = "c.ply"
+time = 20
+"#;
+
+const SEQUENCE: &str = "[data]\nsequence = \"walk.anime\"\nkeys = [0, 10, 18]\n\
+                        correspondences = \"same-vertices\"\n";
+
+/// All that a text says, of whatever key frames.
+fn read(text: &str) -> Result<Recipe, RecipeError> {
+    Recipe::parse_stored(text, Path::new("/shapes/recipe.toml")).map(|(recipe, _)| recipe)
+}
+
+fn message(text: &str) -> String {
+    parsed(text, &[]).expect_err("refused").to_string()
+}
+
+#[test]
+fn two_shapes_are_the_short_form_of_two_key_frames() {
+    let recipe = parsed(SHAPES, &[]).expect("a recipe");
+    let keys = &recipe.data.keyframes;
+    let told: Vec<_> = keys
+        .iter()
+        .map(|key| (key.file.as_path(), key.time))
+        .collect();
+    assert_eq!(
+        told,
+        [(Path::new("/s.ply"), 0.0), (Path::new("/t.ply"), 1.0)]
+    );
+    assert_eq!(recipe.data.between, [Correspondences::None]);
+    let long = "[[data.keyframe]]\nfile = \"/s.ply\"\ntime = 0\n\
+                [[data.keyframe]]\nfile = \"/t.ply\"\ntime = 1\n";
+    assert_eq!(parsed(long, &[]).expect("two key frames"), recipe);
+    assert!(recipe.to_toml().contains("\nsource = \"/s.ply\"\n"));
+}
+
+#[test]
+fn a_list_of_key_frames_has_files_times_and_what_is_known_between() {
+    let recipe = read(THREE).expect("three key frames");
+    let keys = &recipe.data.keyframes;
+    let told: Vec<_> = keys
+        .iter()
+        .map(|key| (key.file.as_path(), key.time))
+        .collect();
+    let file = |name: &'static str| Path::new(name);
+    let wanted = [
+        (file("/shapes/a.ply"), 0.0),
+        (file("/b.ply"), 12.5),
+        (file("/shapes/c.ply"), 20.0),
+    ];
+    assert_eq!(told, wanted);
+    let pairs = Correspondences::File("/shapes/b-to-c.csv".into());
+    assert_eq!(recipe.data.between, [Correspondences::SameVertices, pairs]);
+    assert_eq!(recipe.data.points, 100);
+    assert_eq!(read(&recipe.to_toml()).expect("its own print"), recipe);
+    // Two with times of their own keep them.
+    let two = "[[data.keyframe]]\nfile = \"/s.ply\"\ntime = -3\n\
+               [[data.keyframe]]\nfile = \"/t.ply\"\ntime = 4\n";
+    let two = parsed(two, &[]).expect("two key frames");
+    assert_eq!(two.data.keyframes[0].time, -3.0);
+    assert_eq!(parsed(&two.to_toml(), &[]).expect("its own print"), two);
+}
+
+#[test]
+fn a_sequence_has_the_frames_that_are_its_key_frames() {
+    let recipe = read(SEQUENCE).expect("three frames");
+    let frames: Vec<_> = recipe.data.keyframes.iter().map(|key| key.frame).collect();
+    assert_eq!(frames, [Some(0), Some(10), Some(18)]);
+    assert_eq!(recipe.data.source(), Path::new("/shapes/walk.anime"));
+    assert_eq!(
+        recipe.data.between,
+        [Correspondences::SameVertices, Correspondences::SameVertices]
+    );
+    assert_eq!(read(&recipe.to_toml()).expect("its own print"), recipe);
+}
+
+#[test]
+fn training_on_them_is_refused_in_one_place() {
+    let refused =
+        "training on more than two key frames is not possible yet; give source and target";
+    assert_eq!(message(THREE), format!("recipe.toml:6: {refused}"));
+    assert_eq!(message(SEQUENCE), format!("recipe.toml:2: {refused}"));
+}
+
+#[test]
+fn each_mistake_says_where_it_is_and_what_to_do() {
+    let key = |file: &str, rest: &str| format!("[[data.keyframe]]\nfile = \"{file}\"\n{rest}\n");
+    let two = |rest: &str| key("/a.ply", "time = 1") + &key("/b.ply", rest);
+    for (text, told) in [
+        (
+            two("time = 1"),
+            "recipe.toml:5: data.keyframe.file = \"/b.ply\": its time 1 is not after 1, that of the key \
+             frame before; give them in ascending order",
+        ),
+        (
+            two(""),
+            "recipe.toml: data.keyframe.time is missing (from -1000000000 to 1000000000); add it under \
+             [[data.keyframe]]",
+        ),
+        (
+            two("time = 2\ncorrespondences = \"none\""),
+            "recipe.toml:7: data.keyframe.correspondences = \"none\": no key frame follows the last one; \
+             delete this line",
+        ),
+        (
+            key("/a.ply", "time = 1"),
+            "recipe.toml:2: data.keyframe.file = \"/a.ply\": it is the only key frame; give at least two",
+        ),
+        (
+            two("time = \"late\""),
+            "recipe.toml:6: data.keyframe.time = \"late\": must be a number, from -1000000000 to \
+             1000000000",
+        ),
+        (
+            two("tme = 2"),
+            "recipe.toml:6: data.keyframe.tme: no such key; did you mean time? ([data.keyframe] has \
+             file, time, correspondences)",
+        ),
+        (
+            SHAPES.to_owned() + &two("time = 2"),
+            "recipe.toml:2: data.source = \"/s.ply\": data.keyframe.file is given too (recipe.toml:5); \
+             give the key frames in one way",
+        ),
+        (
+            SEQUENCE.replace("10, 18", "18, 10"),
+            "recipe.toml:3: data.keys = [0, 18, 10]: must be at least two whole numbers in ascending \
+             order",
+        ),
+        (
+            SEQUENCE.replace("keys = [0, 10, 18]", ""),
+            "recipe.toml: data.keys is missing (a list of numbers, each from 0 to 10000000); add it \
+             under [data]",
+        ),
+        (
+            SEQUENCE.replace("same-vertices", "/pairs.csv"),
+            "recipe.toml:4: data.correspondences = \"/pairs.csv\": must be \"none\", \"same-vertices\" or \
+             \"match\" where a sequence is given",
+        ),
+        (
+            "data.keyframe = 3\n".to_owned(),
+            "recipe.toml:1: data.keyframe = 3: must be a list: [[data.keyframe]] on a line of its own \
+             for each key frame",
+        ),
+    ] {
+        assert_eq!(message(&text), told);
+    }
+}
