@@ -71,6 +71,9 @@ fn a_mistake_in_any_recipe_is_told_before_the_first_method_is_trained() {
     }
     let all = ["--methods", "mlp", "--set", "training.batch=63"];
     compare(&place, &all).refused(2, &["training.batch=63", "from 64"]);
+    // A change for all must act in one of them.
+    let idle = ["--methods", "mlp,eigenbasis", "--set", "velocity.width=24"];
+    compare(&place, &idle).refused(2, &["velocity.width=24", "does nothing"]);
     assert_eq!(place.names(), ["truth.anime"]);
 }
 

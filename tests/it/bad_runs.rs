@@ -94,6 +94,8 @@ fn a_damaged_checkpoint_is_refused_with_its_file_and_what_to_do() {
         let parts = [&[file], parts].concat();
         let more = ["resume", "copy", "--quiet", "--set", "training.steps=6"];
         place.isomorph(&more).refused(1, &parts);
+        let recipe = |run: &Run| fs::read(run.path("recipe.toml")).expect("a recipe");
+        assert!(recipe(&copy) == recipe(&run), "the recipe changed");
         place
             .isomorph(&["extract", "copy", "--quiet"])
             .refused(1, &parts);

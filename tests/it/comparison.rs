@@ -232,6 +232,18 @@ fn a_variant_is_a_row_of_its_own_and_its_changes_win_over_those_for_all() {
     );
 }
 
+#[test]
+fn a_change_for_all_methods_counts_where_it_acts() {
+    let _turn = turn();
+    let place = place();
+    let share = ["--set", "training.band-share=0.5"];
+    compare(&place, &[MLP, EIGENBASIS, share].concat()).succeeded();
+    let recipe = |method: &str| result(&place, method)["recipe"].to_string();
+    assert!(recipe("mlp").contains("band-share = 0.5"));
+    // Which samples no space at all.
+    assert!(!recipe("eigenbasis").contains("band-share"));
+}
+
 /// The sphere that f starts from lies outside the box, and one step does not bring it in. A method whose
 /// surface vanishes is a result like any other, and no reason to lose the others.
 #[test]

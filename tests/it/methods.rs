@@ -42,11 +42,11 @@ pub const METHODS: [Method; 9] = [
         "sdf-blend",
         &["method.name = \"sdf-blend\"", SOFT[0], SOFT[1], SOFT[2]],
     ),
-    at_ends("lipmlp", &["method.name = \"lipmlp\"", SOFT[2]]),
-    at_ends("nise", &["method.name = \"nise\"", SOFT[2]]),
+    at_ends("lipmlp", &["method.name = \"lipmlp\"", SOFT[0]]),
+    at_ends("nise", &["method.name = \"nise\"", SOFT[0]]),
     at_ends(
         "nise-velocity",
-        &["method.name = \"nise-velocity\"", SOFT[2]],
+        &["method.name = \"nise-velocity\"", SOFT[0]],
     ),
     Method {
         name: "eigenbasis",
