@@ -14,7 +14,7 @@ use crate::support::workplace::{Ended, Workplace, names, turn};
 
 /// What every comparison here is called with: one frame measured coarsely, on the one backend that all methods
 /// run on. These changes act in all of them.
-pub const SMALL: &str = "compare --sequence truth.anime --samples 500 --resolution 24 --every 2 \
+pub(crate) const SMALL: &str = "compare --sequence truth.anime --samples 500 --resolution 24 --every 2 \
      --backend flex --set data.points=2000";
 
 /// Methods under their own names with small networks, each with the keys that act in it.
@@ -37,14 +37,14 @@ const QUICK: [&str; 2] = [
 ];
 
 /// A folder with the tiny sequence as `truth.anime`.
-pub fn place() -> Workplace {
+pub(crate) fn place() -> Workplace {
     let place = Workplace::new();
     place.write("truth.anime", Sequence::tiny().anime());
     place
 }
 
 /// A comparison of twenty steps on one thread, where every sum has its order.
-pub fn compare(place: &Workplace, more: &[&str]) -> Ended {
+pub(crate) fn compare(place: &Workplace, more: &[&str]) -> Ended {
     let pair = with(SMALL, &["--pairs", "0-4", "--set", "training.steps=20"]);
     place.on_one_thread(&[&pair, more].concat())
 }

@@ -246,7 +246,8 @@ fn without_json_the_means_are_a_table_on_stdout() {
             .lines()
             .find(|line| line.split("  ").next() == Some(name));
         let line = line.unwrap_or_else(|| panic!("no row {name} in\n{}", ended.stdout));
-        let cells = line[name.len()..].split_whitespace().map(str::to_owned);
+        let cells = line.trim_start_matches(name).split_whitespace();
+        let cells = cells.map(str::to_owned);
         cells.collect::<Vec<_>>()
     };
     for (name, metrics) in [

@@ -9,10 +9,12 @@ use crate::support::workplace::{Workplace, turn};
 /// The word or words after a label at the start of a line.
 #[track_caller]
 fn field<'a>(text: &'a str, label: &str) -> &'a str {
-    let line = text
-        .lines()
-        .find(|line| line.split(' ').next() == Some(label));
-    line.unwrap_or_else(|| panic!("no {label:?} in {text}"))[label.len()..].trim()
+    let after = |line: &'a str| {
+        let (first, rest) = line.split_once(' ')?;
+        (first == label).then_some(rest.trim())
+    };
+    let found = text.lines().find_map(after);
+    found.unwrap_or_else(|| panic!("no {label:?} in {text}"))
 }
 
 #[test]

@@ -1,6 +1,9 @@
 //! The program end to end: every test runs the real binary in a temporary folder. `tests/README.md` says
 //! how to run them.
 
+#![allow(clippy::print_stdout, reason = "what was measured, for --nocapture")]
+#![allow(clippy::panic_in_result_fn, reason = "tests fail by panics")]
+
 mod backends;
 mod bad_comparisons;
 mod bad_methods;

@@ -12,19 +12,19 @@ use crate::support::workplace::{NETWORK, Workplace, turn};
 
 /// A method as a recipe chooses it, and what it has.
 #[derive(Clone, Copy, Debug)]
-pub struct Method {
-    pub name: &'static str,
+pub(crate) struct Method {
+    pub(crate) name: &'static str,
     /// What chooses it, and sizes with which a step takes milliseconds: its own keys alone, since a recipe holds
     /// none that does nothing.
     keys: &'static [&'static str],
     /// A field whose zero set is its surface.
-    pub has_field: bool,
+    pub(crate) has_field: bool,
     /// A motion of points.
-    pub has_motion: bool,
+    pub(crate) has_motion: bool,
 }
 
 /// Ours as it ships, the paper's geometry, and every other `method.name`.
-pub const METHODS: [Method; 9] = [
+pub(crate) const METHODS: [Method; 9] = [
     Method {
         name: "shipped",
         keys: &[],
@@ -117,12 +117,12 @@ impl Method {
     }
 
     /// A place with its recipe.
-    pub fn place(self) -> Workplace {
+    pub(crate) fn place(self) -> Workplace {
         Workplace::tiny_with(self.sizes(), &[KEYS, self.keys].concat())
     }
 
     /// A place in which it was trained on one thread, and the run.
-    pub fn trained(self) -> (Workplace, Run) {
+    pub(crate) fn trained(self) -> (Workplace, Run) {
         let place = self.place();
         let train = ["train", "recipe.toml", "--quiet", "--run", "run"];
         place.on_one_thread(&train).succeeded();
@@ -132,7 +132,7 @@ impl Method {
 }
 
 /// The methods of these names.
-pub fn named(names: &'static [&'static str]) -> impl Iterator<Item = Method> {
+pub(crate) fn named(names: &'static [&'static str]) -> impl Iterator<Item = Method> {
     let found = METHODS
         .into_iter()
         .filter(|method| names.contains(&method.name));
@@ -141,7 +141,7 @@ pub fn named(names: &'static [&'static str]) -> impl Iterator<Item = Method> {
 }
 
 /// Surfaces of the run at both ends.
-pub const EXTRACT: &str = "extract run --quiet --times 0,1 --resolution 32";
+pub(crate) const EXTRACT: &str = "extract run --quiet --times 0,1 --resolution 32";
 
 /// The surfaces in a folder, in the order of `frames.json`, and its entries.
 fn surfaces(folder: &Path) -> (Vec<Mesh>, Value) {

@@ -25,7 +25,7 @@ fn place(column: &[&str]) -> Workplace {
 }
 
 /// The steps that such a run logs: the first, every third, those of checkpoints, and the last.
-pub fn logged(steps: u64, every: u64) -> Vec<u64> {
+pub(crate) fn logged(steps: u64, every: u64) -> Vec<u64> {
     (1..=steps)
         .filter(|step| *step == 1 || step % 3 == 0 || step % every == 0)
         .collect()
@@ -33,7 +33,7 @@ pub fn logged(steps: u64, every: u64) -> Vec<u64> {
 
 /// Both runs are the same in every network, every logged step and every logged term.
 #[track_caller]
-pub fn assert_same(resumed: &Run, whole: &Run) {
+pub(crate) fn assert_same(resumed: &Run, whole: &Run) {
     assert_eq!(resumed.step(), whole.step());
     // Not assert_eq!, which would print them.
     assert!(
@@ -43,13 +43,13 @@ pub fn assert_same(resumed: &Run, whole: &Run) {
     assert_eq!(resumed.metrics(), whole.metrics());
 }
 
-pub fn resume_on_one_thread(place: &Workplace, run: &str, backend: &str) -> Ended {
+pub(crate) fn resume_on_one_thread(place: &Workplace, run: &str, backend: &str) -> Ended {
     place
         .on_one_thread(&["resume", run, "--quiet", "--backend", backend])
         .succeeded()
 }
 
-pub fn whole_on_one_thread(place: &Workplace, backend: &str) -> Run {
+pub(crate) fn whole_on_one_thread(place: &Workplace, backend: &str) -> Run {
     let arguments = [
         "train",
         "recipe.toml",
