@@ -10,7 +10,7 @@ use crate::support::workplace::{Workplace, turn};
 
 /// A run of a second or more that can be stopped in the middle.
 const LONGER: &[&str] = &[
-    "training.steps = 2000",
+    "training.steps = 1000",
     "training.log-every = 3",
     "checkpoint.every = 25",
     "checkpoint.keep = 2",
@@ -87,10 +87,10 @@ fn a_run_killed_again_and_again_ends_in_the_same_networks() {
     assert!(killed >= 3, "killed {killed} times only");
     resume_on_one_thread(&place, "run", "flex");
     let run = place.run("run");
-    assert_eq!(run.logged_steps(), logged(2000, 25));
+    assert_eq!(run.logged_steps(), logged(1000, 25));
     assert_eq!(
         run.checkpoints(),
-        ["step-001975", "step-002000"],
+        ["step-000975", "step-001000"],
         "nothing torn is left"
     );
     assert_same(&run, &whole);
@@ -162,7 +162,7 @@ fn an_interrupt_leaves_a_checkpoint_of_the_present_step_and_exits_130() {
         assert_eq!(told, "", "{signal}");
         let step = run.step();
         assert!(
-            (1..2000).contains(&step),
+            (1..1000).contains(&step),
             "{signal}: stopped at step {step}"
         );
         assert!(run.logged_steps().iter().all(|logged| *logged <= step));
