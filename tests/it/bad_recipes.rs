@@ -3,7 +3,7 @@
 
 use std::fs;
 
-use crate::support::workplace::{Ended, Workplace};
+use crate::support::workplace::{Ended, NETWORK, Workplace};
 
 /// Lines that are wrong, and what the message must say of each.
 const WRONG: &[(&str, &[&str])] = &[
@@ -25,8 +25,72 @@ const WRONG: &[(&str, &[&str])] = &[
         "implicit.skip = 7",
         &["implicit.skip = 7", "implicit.depth"],
     ),
+    // Keys that do nothing: of the other geometry, of another method, of an earlier version.
+    (
+        "loss.lambda-l = 1",
+        &["loss.lambda-l = 1", "does nothing", "flow", "network"],
+    ),
+    (
+        "loss.transported-normals = 0",
+        &[
+            "loss.transported-normals = 0",
+            "does nothing",
+            "delete this line",
+        ],
+    ),
+    ("nfgp.deformations = 4", &["nfgp.deformations = 4", "nfgp"]),
+    (
+        "method.deformations = 4",
+        &["method.deformations = 4", "nfgp"],
+    ),
+    (
+        "loss.steadiness = 1",
+        &["loss.steadiness = 1", "delete this line"],
+    ),
+    (
+        "loss.stretch = 0",
+        &["loss.stretch = 0", "delete this line"],
+    ),
     ("training.steps = = 5", &["not TOML"]),
 ];
+
+/// Of the paper's geometry other keys do nothing, and of another method most.
+#[test]
+fn a_key_that_does_nothing_is_refused_with_its_line_and_where_it_acts() {
+    let cases: [(&[&str], &str, &[&str]); 4] = [
+        (NETWORK, "loss.distance = 10", &["flow"]),
+        (
+            &["method.name = \"mlp\""],
+            "velocity.width = 24",
+            &["mlp", "velocity-field"],
+        ),
+        (
+            &["method.name = \"lipmlp\""],
+            "nise.omega = 20",
+            &["lipmlp", "nise"],
+        ),
+        (
+            &["method.name = \"nise\""],
+            "method.omega = 20",
+            &["nise.omega"],
+        ),
+    ];
+    for (keys, line, parts) in cases {
+        let place = Workplace::tiny_with(&[], &[keys, &[line]].concat());
+        let text = fs::read_to_string(place.path("recipe.toml")).expect("a recipe");
+        let at = format!("recipe.toml:{}: {line}", text.lines().count());
+        let before = place.names();
+        let train = ["train", "recipe.toml", "--run", "run"];
+        place
+            .isomorph(&train)
+            .refused(2, &[&[at.as_str()], parts].concat());
+        assert_eq!(place.names(), before, "{line:?} leaves something behind");
+    }
+    // The same words on the command line.
+    let place = Workplace::tiny(&[]);
+    let ended = place.isomorph(&["train", "recipe.toml", "--set", "loss.lambda-l=1"]);
+    ended.refused(2, &["--set loss.lambda-l=1", "does nothing"]);
+}
 
 #[test]
 fn a_bad_recipe_is_refused_with_file_line_key_value_and_what_is_allowed() {
@@ -94,11 +158,11 @@ fn a_backend_or_device_that_is_not_there_leaves_no_run() {
     let gpu = ["--backend", "flex", "--device", "discrete:1"];
     place
         .isomorph(&[&train[..], &gpu].concat())
-        .refused(2, &["--device discrete:1", "wgpu"]);
+        .refused(2, &["device discrete:1", "wgpu"]);
     let unknown = ["--backend", "wgpu", "--device", "gpu"];
     place
         .isomorph(&[&train[..], &unknown].concat())
-        .refused(2, &["--device gpu", "discrete"]);
+        .refused(2, &["device gpu", "discrete"]);
     assert_eq!(place.names(), before);
 }
 
@@ -123,9 +187,9 @@ fn a_machine_without_a_vulkan_driver_is_told_what_to_do() {
     ended.refused(
         1,
         &[
-            "--backend wgpu: no device",
+            "backend wgpu: no device",
             "mesa-vulkan-drivers",
-            "--backend",
+            "backend flex",
         ],
     );
     assert_eq!(place.names(), before);

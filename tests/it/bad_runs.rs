@@ -38,7 +38,9 @@ fn a_run_is_not_overwritten_without_force_and_force_replaces_nothing_but_a_run()
     fs::create_dir(place.path("thesis")).expect("a folder");
     place.write("thesis/chapter.tex", "precious");
     let ended = place.isomorph(&[&train[..], &["--run", "thesis", "--force"]].concat());
-    ended.refused(2, &["thesis: exists and is not a run", "--run"]);
+    ended.refused(2, &["thesis: exists and is not a run", "another folder"]);
+    let ended = place.isomorph(&[&train[..], &["--run", "thesis"]].concat());
+    ended.refused(2, &["thesis: exists already", "another folder"]);
     assert_eq!(
         fs::read(place.path("thesis/chapter.tex")).expect("still there"),
         b"precious"
@@ -61,7 +63,7 @@ fn a_damaged_checkpoint_is_refused_with_its_file_and_what_to_do() {
     let _turn = turn();
     let (place, run) = trained();
     let state = fs::read_to_string(run.newest().join("state.json")).expect("a state");
-    let record = &run.networks()[1];
+    let record = &run.networks()["velocity.mpk"];
     let mut flipped = record.clone();
     flipped[record.len() / 2] ^= 1;
     let later = state.replacen("\"format_version\": 1", "\"format_version\": 999", 1);
@@ -92,6 +94,8 @@ fn a_damaged_checkpoint_is_refused_with_its_file_and_what_to_do() {
         let parts = [&[file], parts].concat();
         let more = ["resume", "copy", "--quiet", "--set", "training.steps=6"];
         place.isomorph(&more).refused(1, &parts);
+        let recipe = |run: &Run| fs::read(run.path("recipe.toml")).expect("a recipe");
+        assert!(recipe(&copy) == recipe(&run), "the recipe changed");
         place
             .isomorph(&["extract", "copy", "--quiet"])
             .refused(1, &parts);
@@ -130,7 +134,7 @@ fn a_changed_network_is_refused_with_both_values_and_the_run_stays_as_it_is() {
         1,
         &[
             "velocity.width is 24 in the checkpoint and 25",
-            "isomorph train",
+            "start a new run",
         ],
     );
     assert_eq!(
@@ -148,7 +152,10 @@ fn a_run_does_not_go_on_with_other_shapes() {
     let ended = place.isomorph(&["resume", "run", "--quiet", "--set", "training.steps=6"]);
     ended.refused(
         1,
-        &["the shapes are not those that this run was started with"],
+        &[
+            "the shapes are not those that this run was started with",
+            "start a new run",
+        ],
     );
 }
 
@@ -160,7 +167,7 @@ fn what_is_not_a_run_is_told_so() {
         fs::create_dir_all(place.path("folder")).expect("a folder");
         place
             .isomorph(&[command, "folder"])
-            .refused(2, &["folder: not a run", "isomorph train"]);
+            .refused(2, &["folder: not a run", "name the folder"]);
     }
     place
         .isomorph(&["resume", "nowhere"])
@@ -178,9 +185,9 @@ fn what_is_not_a_run_is_told_so() {
 fn extraction_refuses_times_outside_and_a_grid_of_nothing() {
     let _turn = turn();
     let (place, run) = trained();
-    for times in ["0.5,1.5", "nan"] {
+    for (times, found) in [("0.5,1.5", "time 1.5"), ("nan", "time NaN")] {
         let ended = place.isomorph(&["extract", "run", "--times", times]);
-        ended.refused(2, &["--times", "must be 0 to 1"]);
+        ended.refused(2, &[found, "must be 0 to 1"]);
     }
     for bad in [
         ["--resolution", "0"],
@@ -198,7 +205,7 @@ fn extraction_refuses_times_outside_and_a_grid_of_nothing() {
     let share = ["extract", "run", "--smallest-component", "1.5"];
     place
         .isomorph(&share)
-        .refused(2, &["--smallest-component", "1.5", "0 to 1"]);
+        .refused(2, &["smallest component 1.5", "0 to 1"]);
     assert!(
         !run.path("meshes").exists(),
         "surfaces of a refused command"

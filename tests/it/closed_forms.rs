@@ -1,17 +1,19 @@
-//! Motions with exact answers: a sphere that moves, a sphere that grows, a bar that turns.
+//! Motions with exact answers: a sphere that moves, a sphere that grows, a bar that turns. Each is trained as
+//! the product ships, and in the paper's geometry.
 //!
 //! Each trains for about 20 seconds and is then held against the exact shape in between, which training
 //! never saw. Distances are shares of the sphere's radius or of the bar's length.
 //!
-//! Thresholds are 1.5 to 1.8 times the worst that was measured over the three times and over the seeds 0 to
-//! 3, on flex; the measured values stand beside them.
+//! Thresholds of the paper's geometry are 1.5 to 1.8 times the worst that was measured over the three times and
+//! over the seeds 0 to 3, on flex; the measured values stand beside them. Those of the product as it ships are
+//! twice and more of fewer seeds.
 
 use std::f64::consts::PI;
 
 use crate::support::mesh::{Mesh, Point, distance, distance_to_bar, turned};
 use crate::support::ply::Ply;
 use crate::support::run::{Frame, frames};
-use crate::support::workplace::{Workplace, turn};
+use crate::support::workplace::{NETWORK, SHIPPED, Workplace, turn};
 
 /// Smaller networks and batches than `quick`, and fewer steps.
 const KEYS: &[&str] = &[
@@ -29,6 +31,7 @@ const KEYS: &[&str] = &[
 struct Motion {
     source: Mesh,
     target: Mesh,
+    /// What this motion changes in the recipe.
     keys: &'static [&'static str],
     /// Where a point of the source is at a time.
     path: fn(Point, f64) -> Point,
@@ -51,9 +54,9 @@ struct Limits {
 }
 
 /// Trains on the two ends, extracts three times in between, and holds them against the exact shapes.
-fn check(motion: &Motion, limits: &Limits) {
+fn check(motion: &Motion, column: &[&str], limits: &Limits) {
     let _turn = turn();
-    let keys = [KEYS, motion.keys].concat();
+    let keys = [column, KEYS, motion.keys].concat();
     let place = Workplace::with_pair(&motion.source, &motion.target, &keys);
     let run = place.train("run", &["--backend", "flex"]);
     let times = ["--times", "0.25,0.5,0.75", "--resolution", "96"];
@@ -115,20 +118,41 @@ fn mean_and_max(values: impl Iterator<Item = f64>) -> (f64, f64) {
 
 const AWAY: Point = [1.0, 0.5, 0.0];
 
-#[test]
-fn a_sphere_that_moves_keeps_its_shape_and_its_volume() {
+fn moving_sphere() -> Motion {
     let path = |x: Point, time: f64| std::array::from_fn(|axis| x[axis] + time * AWAY[axis]);
     let sphere = Mesh::sphere(1.0, 4);
-    let motion = Motion {
+    Motion {
         target: sphere.clone().map(|x| path(x, 1.0)),
         source: sphere,
         keys: &[],
         path,
         distance: |x, time| (distance(x, AWAY.map(|part| part * time)) - 1.0).abs(),
         volume: |_| 4.0 / 3.0 * PI,
-    };
+    }
+}
+
+#[test]
+fn a_sphere_that_moves_keeps_its_shape_and_its_volume() {
     check(
-        &motion,
+        &moving_sphere(),
+        SHIPPED,
+        // Measured, seed 0 alone: 0.0022, 0.0094, 0.0027, 0.0155, 0.0062.
+        // measured: TO BE FILLED for the seeds 1 to 3
+        &Limits {
+            mean: 0.006,
+            max: 0.03,
+            volume: 0.01,
+            carried: 0.035,
+            slope: 0.02,
+        },
+    );
+}
+
+#[test]
+fn a_sphere_that_moves_in_the_papers_geometry_keeps_its_shape_and_its_volume() {
+    check(
+        &moving_sphere(),
+        NETWORK,
         // Measured: 0.0123, 0.0418, 0.0363, 0.0344, 0.0578.
         &Limits {
             mean: 0.02,
@@ -140,6 +164,51 @@ fn a_sphere_that_moves_keeps_its_shape_and_its_volume() {
     );
 }
 
+/// A sphere of radius 1 that grows, and neither its volume nor its distances stay.
+fn growing_sphere(
+    path: fn(Point, f64) -> Point,
+    distance: fn(Point, f64) -> f64,
+    volume: fn(f64) -> f64,
+) -> Motion {
+    let sphere = Mesh::sphere(1.0, 4);
+    Motion {
+        target: sphere.clone().map(|x| path(x, 1.0)),
+        source: sphere,
+        keys: &["loss.divergence = 0", "loss.strain = 0"],
+        path,
+        distance,
+        volume,
+    }
+}
+
+/// A `V = x r'/r` that depends on time has `dV/dt + D V = x r''/r`, the price of `loss.screw`: it is zero where
+/// the radius grows evenly, from 1 to 1.5.
+fn even_radius(time: f64) -> f64 {
+    1.0 + 0.5 * time
+}
+
+#[test]
+fn a_sphere_that_grows_does_so_evenly() {
+    let motion = growing_sphere(
+        |x, time| x.map(|part| part * even_radius(time)),
+        |x, time| (distance(x, [0.0; 3]) - even_radius(time)).abs(),
+        |time| 4.0 / 3.0 * PI * even_radius(time).powi(3),
+    );
+    check(
+        &motion,
+        SHIPPED,
+        // Measured, seed 0 alone: 0.0066, 0.0193, 0.0092, 0.0259, 0.0126.
+        // measured: TO BE FILLED for the seeds 1 to 3
+        &Limits {
+            mean: 0.015,
+            max: 0.04,
+            volume: 0.03,
+            carried: 0.05,
+            slope: 0.03,
+        },
+    );
+}
+
 /// A velocity that does not depend on time grows a sphere from 1 to 1.5 along `r(t) = 1.5^t` if it is
 /// linear in x, which is the simplest of those that fit the ends.
 fn radius(time: f64) -> f64 {
@@ -147,20 +216,15 @@ fn radius(time: f64) -> f64 {
 }
 
 #[test]
-fn a_sphere_that_grows_does_so_at_a_constant_rate() {
-    let path = |x: Point, time: f64| x.map(|part| part * radius(time));
-    let sphere = Mesh::sphere(1.0, 4);
-    let motion = Motion {
-        target: sphere.clone().map(|x| path(x, 1.0)),
-        source: sphere,
-        // Neither its volume nor its distances stay.
-        keys: &["loss.divergence = 0", "loss.strain = 0"],
-        path,
-        distance: |x, time| (distance(x, [0.0; 3]) - radius(time)).abs(),
-        volume: |time| 4.0 / 3.0 * PI * radius(time).powi(3),
-    };
+fn a_sphere_that_grows_in_the_papers_geometry_does_so_at_a_constant_rate() {
+    let motion = growing_sphere(
+        |x, time| x.map(|part| part * radius(time)),
+        |x, time| (distance(x, [0.0; 3]) - radius(time)).abs(),
+        |time| 4.0 / 3.0 * PI * radius(time).powi(3),
+    );
     check(
         &motion,
+        NETWORK,
         // Measured: 0.0211, 0.0344, 0.0518, 0.0273, 0.0483.
         &Limits {
             mean: 0.035,
@@ -175,13 +239,13 @@ fn a_sphere_that_grows_does_so_at_a_constant_rate() {
 const BAR: Point = [1.0, 0.25, 0.25];
 
 /// A bar that turns by 60 degrees about the third axis.
-fn turning_bar(keys: &'static [&'static str]) -> Motion {
+fn turning_bar() -> Motion {
     let path = |x: Point, time: f64| turned(x, PI / 3.0 * time);
     let bar = Mesh::bar(BAR, 1.0 / 32.0);
     Motion {
         target: bar.clone().map(|x| path(x, 1.0)),
         source: bar,
-        keys,
+        keys: &[],
         path,
         distance: |x, time| distance_to_bar(turned(x, -PI / 3.0 * time), BAR),
         volume: |_| BAR.iter().product(),
@@ -191,7 +255,25 @@ fn turning_bar(keys: &'static [&'static str]) -> Motion {
 #[test]
 fn a_bar_that_turns_stays_a_bar() {
     check(
-        &turning_bar(&[]),
+        &turning_bar(),
+        SHIPPED,
+        // Measured, seed 0 alone: 0.0014, 0.0079, 0.0061, 0.0086, 0.0675.
+        // measured: TO BE FILLED for the seeds 1 to 3
+        &Limits {
+            mean: 0.003,
+            max: 0.02,
+            volume: 0.025,
+            carried: 0.02,
+            slope: 0.15,
+        },
+    );
+}
+
+#[test]
+fn a_bar_that_turns_in_the_papers_geometry_stays_a_bar() {
+    check(
+        &turning_bar(),
+        NETWORK,
         // Measured: 0.0071, 0.0497, 0.0630, 0.0106, 0.2728.
         &Limits {
             mean: 0.012,
@@ -199,34 +281,6 @@ fn a_bar_that_turns_stays_a_bar() {
             volume: 0.1,
             carried: 0.018,
             slope: 0.42,
-        },
-    );
-}
-
-/// What `quick` and `default` are: two end fields of sines that the flow of a `V` of time carries.
-const FLOW: &[&str] = &[
-    "implicit.geometry = \"flow\"",
-    "implicit.activation = \"sine\"",
-    "implicit.beta = 20",
-    "velocity.time-dependent = true",
-    "loss.screw = 30",
-    "training.learning-rate = 5e-4",
-    "training.velocity-until = 1",
-    "training.integrator = \"rk4\"",
-    "training.time-steps = 2",
-];
-
-#[test]
-fn a_bar_that_the_flow_turns_stays_a_bar() {
-    check(
-        &turning_bar(FLOW),
-        // Measured, seed 0 alone, hence twice and more: 0.0013, 0.0078, 0.0086, 0.0083, 0.0699.
-        &Limits {
-            mean: 0.003,
-            max: 0.02,
-            volume: 0.025,
-            carried: 0.02,
-            slope: 0.15,
         },
     );
 }

@@ -12,21 +12,39 @@ use crate::support::run::json;
 use crate::support::sequence::Sequence;
 use crate::support::workplace::{Ended, Workplace, names, turn};
 
-/// What every comparison here is called with: small networks, one frame measured coarsely.
-pub const SMALL: &str = "compare --sequence truth.anime --samples 500 --resolution 24 --every 2 \
-     --backend ndarray --set implicit.depth=3 --set implicit.width=32 --set velocity.depth=2 \
-     --set velocity.width=24 --set data.points=2000 --set training.batch=200 \
-     --set training.correspondence-batch=40";
+/// What every comparison here is called with: one frame measured coarsely, on the one backend that all methods
+/// run on. These changes act in all of them.
+pub(crate) const SMALL: &str = "compare --sequence truth.anime --samples 500 --resolution 24 --every 2 \
+     --backend flex --set data.points=2000";
+
+/// Methods under their own names with small networks, each with the keys that act in it.
+const MLP: [&str; 2] = [
+    "--variant",
+    "mlp=mlp,implicit.depth=3,implicit.width=32,training.batch=200",
+];
+const SDF_BLEND: [&str; 2] = [
+    "--variant",
+    "sdf-blend=sdf-blend,implicit.depth=3,implicit.width=32,training.batch=200",
+];
+const EIGENBASIS: [&str; 2] = [
+    "--variant",
+    "eigenbasis=eigenbasis,training.correspondence-batch=40",
+];
+const QUICK: [&str; 2] = [
+    "--variant",
+    "quick=quick,implicit.depth=3,implicit.width=32,velocity.depth=2,velocity.width=24,\
+     training.batch=200,training.correspondence-batch=40",
+];
 
 /// A folder with the tiny sequence as `truth.anime`.
-pub fn place() -> Workplace {
+pub(crate) fn place() -> Workplace {
     let place = Workplace::new();
     place.write("truth.anime", Sequence::tiny().anime());
     place
 }
 
 /// A comparison of twenty steps on one thread, where every sum has its order.
-pub fn compare(place: &Workplace, more: &[&str]) -> Ended {
+pub(crate) fn compare(place: &Workplace, more: &[&str]) -> Ended {
     let pair = with(SMALL, &["--pairs", "0-4", "--set", "training.steps=20"]);
     place.on_one_thread(&[&pair, more].concat())
 }
@@ -61,7 +79,7 @@ fn trained_at(place: &Workplace, method: &str) -> SystemTime {
 fn two_methods_leave_a_table_a_figure_and_a_file_each() {
     let _turn = turn();
     let place = place();
-    let ended = compare(&place, &["--methods", "mlp,eigenbasis"]).succeeded();
+    let ended = compare(&place, &[MLP, EIGENBASIS].concat()).succeeded();
     assert_eq!(place.names(), ["results", "runs", "truth.anime"]);
     let files = "0-4.eigenbasis.json 0-4.mlp.json comparison.json error.svg table.md";
     let folder = place.path("results/truth");
@@ -84,7 +102,7 @@ fn two_methods_leave_a_table_a_figure_and_a_file_each() {
 fn a_comparison_that_is_done_is_printed_again_from_what_is_kept() {
     let _turn = turn();
     let place = place();
-    let methods = ["--methods", "mlp,eigenbasis"];
+    let methods = [MLP, EIGENBASIS].concat();
     compare(&place, &methods).succeeded();
     let read = |name: &str| fs::read_to_string(place.path("results/truth").join(name));
     let kept = || ["comparison.json", "0-4.mlp.json"].map(|name| read(name).expect("a file"));
@@ -127,9 +145,9 @@ fn begins(ended: &Ended, method: &str) -> bool {
 fn a_method_that_is_added_is_the_only_one_that_is_done() {
     let _turn = turn();
     let place = place();
-    compare(&place, &["--methods", "mlp,eigenbasis"]).succeeded();
+    compare(&place, &[MLP, EIGENBASIS].concat()).succeeded();
     let before = ["mlp", "eigenbasis"].map(|method| result(&place, method));
-    let ended = compare(&place, &["--methods", "mlp,sdf-blend,eigenbasis"]).succeeded();
+    let ended = compare(&place, &[MLP, SDF_BLEND, EIGENBASIS].concat()).succeeded();
     let done = ["mlp", "sdf-blend", "eigenbasis"].map(|method| begins(&ended, method));
     assert_eq!(done, [false, true, false], "{}", ended.stderr);
     assert_eq!(
@@ -143,7 +161,7 @@ fn a_method_that_is_added_is_the_only_one_that_is_done() {
 fn a_result_that_is_damaged_or_of_other_data_is_made_again_with_a_note() {
     let _turn = turn();
     let place = place();
-    let methods = ["--methods", "mlp,eigenbasis"];
+    let methods = [MLP, EIGENBASIS].concat();
     compare(&place, &methods).succeeded();
     let (before, trained) = (result(&place, "mlp"), trained_at(&place, "mlp"));
 
@@ -170,8 +188,8 @@ fn a_result_that_is_damaged_or_of_other_data_is_made_again_with_a_note() {
         "measured only: its run is whole"
     );
 
-    let denser = ["--methods", "mlp", "--set", "data.points=2100"];
-    let ended = compare(&place, &denser).succeeded();
+    let denser = ["--set", "data.points=2100"];
+    let ended = compare(&place, &[MLP, denser].concat()).succeeded();
     let note = format!("note: {file}: made with another recipe, data or evaluation");
     assert!(ended.stderr.starts_with(&note), "{}", ended.stderr);
     assert_ne!(result(&place, "mlp")["evaluation"], before["evaluation"]);
@@ -186,12 +204,10 @@ fn a_result_that_is_damaged_or_of_other_data_is_made_again_with_a_note() {
 fn a_variant_is_a_row_of_its_own_and_its_changes_win_over_those_for_all() {
     let _turn = turn();
     let place = place();
-    let variant = "wider mlp=mlp,implicit.width=48,training.steps=12";
-    let ended = compare(
-        &place,
-        &["--methods", "mlp", "--variant", variant, "--json"],
-    )
-    .succeeded();
+    let wider =
+        "wider mlp=mlp,implicit.depth=3,implicit.width=48,training.batch=200,training.steps=12";
+    let more = [&MLP[..], &["--variant", wider, "--json"]].concat();
+    let ended = compare(&place, &more).succeeded();
     let comparison: Value = serde_json::from_str(&ended.stdout).expect("JSON");
     let methods = &comparison["pairs"][0]["methods"];
     let row = |k: usize| (methods[k]["method"].as_str(), methods[k]["steps"].as_u64());
@@ -216,14 +232,27 @@ fn a_variant_is_a_row_of_its_own_and_its_changes_win_over_those_for_all() {
     );
 }
 
+#[test]
+fn a_change_for_all_methods_counts_where_it_acts() {
+    let _turn = turn();
+    let place = place();
+    let share = ["--set", "training.band-share=0.5"];
+    compare(&place, &[MLP, EIGENBASIS, share].concat()).succeeded();
+    let recipe = |method: &str| result(&place, method)["recipe"].to_string();
+    assert!(recipe("mlp").contains("band-share = 0.5"));
+    // Which samples no space at all.
+    assert!(!recipe("eigenbasis").contains("band-share"));
+}
+
 /// The sphere that f starts from lies outside the box, and one step does not bring it in. A method whose
 /// surface vanishes is a result like any other, and no reason to lose the others.
 #[test]
 fn a_method_without_a_surface_is_a_row_without_its_numbers() {
     let _turn = turn();
     let place = place();
-    let gone = "gone=mlp,training.steps=1,implicit.sphere-radius=9";
-    let methods = ["--variant", gone, "--methods", "mlp", "--json"];
+    let gone =
+        "gone=mlp,implicit.depth=3,implicit.width=32,training.steps=1,implicit.sphere-radius=9";
+    let methods = [&MLP[..], &["--variant", gone, "--json"]].concat();
     let ended = compare(&place, &methods).succeeded();
     let comparison: Value = serde_json::from_str(&ended.stdout).expect("JSON");
     let rows = &comparison["pairs"][0]["methods"];
@@ -251,10 +280,11 @@ fn longer(results: &'static str) -> Vec<&'static str> {
     } else {
         "cut-runs"
     };
+    let methods = [MLP, QUICK, ["--output", results], ["--work", work]].concat();
     let more = with(
-        "--pairs 0-4 --methods mlp,quick --quiet --set training.steps=300 \
-         --set training.log-every=5 --set checkpoint.every=25",
-        &["--output", results, "--work", work],
+        "--pairs 0-4 --quiet --set training.steps=300 --set training.log-every=5 \
+         --set checkpoint.every=25",
+        &methods,
     );
     with(SMALL, &more)
 }
@@ -283,7 +313,7 @@ fn wait_for_checkpoint(run: &Path) {
     }
 }
 
-/// On one thread of ndarray every sum has its order, and so the numbers are the same to the last digit.
+/// On one thread every sum has its order, and so the numbers are the same to the last digit.
 #[cfg(unix)]
 #[test]
 fn a_comparison_that_is_killed_and_interrupted_ends_in_the_same_numbers() {

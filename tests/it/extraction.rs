@@ -7,7 +7,8 @@ use crate::support::ply::{self, Ply};
 use crate::support::run::frames;
 use crate::support::workplace::{Workplace, turn};
 
-/// A few steps: what is extracted is then near the sphere that f starts from, and a surface like any other.
+/// A few steps: what is extracted is then near the sphere that the fields start from, and a surface like any
+/// other.
 const KEYS: &[&str] = &[
     "training.steps = 10",
     "training.log-every = 4",

@@ -9,10 +9,12 @@ use crate::support::workplace::{Workplace, turn};
 /// The word or words after a label at the start of a line.
 #[track_caller]
 fn field<'a>(text: &'a str, label: &str) -> &'a str {
-    let line = text
-        .lines()
-        .find(|line| line.split(' ').next() == Some(label));
-    line.unwrap_or_else(|| panic!("no {label:?} in {text}"))[label.len()..].trim()
+    let after = |line: &'a str| {
+        let (first, rest) = line.split_once(' ')?;
+        (first == label).then_some(rest.trim())
+    };
+    let found = text.lines().find_map(after);
+    found.unwrap_or_else(|| panic!("no {label:?} in {text}"))
 }
 
 #[test]
@@ -135,7 +137,7 @@ fn every_command_has_help_that_names_its_defaults() {
             &["--aligned", "[default: pairs.csv]", "[default: 0.5]"],
         ),
         ("normals", &["--output", "all pointing out"]),
-        ("init", &["[default: none]", "[default: default]"]),
+        ("init", &["[default: none]", "[default: default]", "--all"]),
         ("info", &["recipe", "run"]),
         ("bench", &["--json"]),
     ];

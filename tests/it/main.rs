@@ -1,8 +1,12 @@
 //! The program end to end: every test runs the real binary in a temporary folder. `tests/README.md` says
 //! how to run them.
 
+#![allow(clippy::print_stdout, reason = "what was measured, for --nocapture")]
+#![allow(clippy::panic_in_result_fn, reason = "tests fail by panics")]
+
 mod backends;
 mod bad_comparisons;
+mod bad_methods;
 mod bad_recipes;
 mod bad_runs;
 mod bad_shapes;
@@ -10,12 +14,16 @@ mod closed_forms;
 mod comparison;
 mod evaluation;
 mod extraction;
+mod front_door;
 mod golden;
 mod information;
+mod interruption;
 mod matching;
 mod methods;
 mod normals;
+mod old_runs;
 mod outputs;
 mod paper;
 mod resume;
+mod samples;
 mod support;

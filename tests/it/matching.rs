@@ -176,12 +176,12 @@ fn what_cannot_be_matched_is_refused_in_a_line_and_nothing_is_written() {
         (
             &["a.ply", "a.ply", "--nodes", "3"],
             2,
-            &["--nodes 3", "64 to 10000"],
+            &["nodes 3", "64 to 10000"],
         ),
         (
             &["a.ply", "a.ply", "--confidence", "2"],
             2,
-            &["--confidence 2", "0 to 1"],
+            &["confidence 2", "0 to 1"],
         ),
         (
             &["a.ply", "a.ply", "--picture", "p.png"],

@@ -10,8 +10,8 @@ use crate::support::ply::{self, Ply};
 use crate::support::run::{frames, json};
 use crate::support::workplace::{Workplace, names, turn};
 
-/// A few steps and three small surfaces. So early f is still close to the sphere that it starts from,
-/// which is a surface like any other.
+/// A few steps and three small surfaces. So early the fields are still close to the sphere that they start
+/// from, which is a surface like any other.
 const KEYS: &[&str] = &[
     "training.steps = 10",
     "training.log-every = 4",
@@ -43,7 +43,7 @@ fn training_leaves_a_whole_run_and_nothing_else() {
     ];
     assert_eq!(names(&run.0), wanted);
     assert_eq!(run.checkpoints(), ["step-000005", "step-000010"]);
-    let parts = ["implicit-optimiser.mpk", "implicit.mpk", "state.json"];
+    let parts = ["ends-optimiser.mpk", "ends.mpk", "state.json"];
     let velocity = ["velocity-optimiser.mpk", "velocity.mpk"];
     assert_eq!(names(&run.newest()), [&parts[..], &velocity].concat());
     let surfaces = ["surface-000.ply", "surface-001.ply", "surface-002.ply"];
@@ -56,7 +56,10 @@ fn training_leaves_a_whole_run_and_nothing_else() {
     assert!(picture.starts_with(b"\x89PNG\r\n\x1a\n") && picture.len() > 1000);
     let log = fs::read_to_string(run.path("run.log")).expect("a log");
     // As in 2026-03-01T12:00:00Z.
-    let stamped = |line: &str| line.as_bytes().get(19..21) == Some(b"Z ") && &line[10..11] == "T";
+    let stamped = |line: &str| {
+        let bytes = line.as_bytes();
+        bytes.get(19..21) == Some(b"Z ") && bytes.get(10) == Some(&b'T')
+    };
     assert!(log.lines().count() > 5 && log.lines().all(stamped), "{log}");
 }
 
@@ -104,7 +107,6 @@ fn the_json_of_a_run_has_the_fields_that_are_documented_and_no_others() {
         "files",
         "format_version",
         "isomorph_version",
-        "network_digest",
         "normalisation",
         "recipe",
         "seconds",
@@ -183,6 +185,12 @@ fn results_go_to_standard_output_and_all_else_to_standard_error() {
     assert_eq!(ended.stdout, "", "a run is its folder");
     assert!(
         ended.stderr.contains("10") && ended.stderr.contains("surface-002.ply"),
+        "{ended:?}"
+    );
+    assert!(
+        ended
+            .stderr
+            .contains("2,000 points, 2,000 on the key frames"),
         "{ended:?}"
     );
     assert!(
@@ -273,6 +281,27 @@ fn clouds_without_normals_train_and_are_carried() {
     assert!(carried.triangles.is_empty());
 }
 
+/// The keys that people change, which stand first.
+const FIRST: [&str; 10] = [
+    "preset",
+    "data.correspondences",
+    "data.normals",
+    "loss.divergence",
+    "loss.strain",
+    "loss.matching-scale",
+    "training.steps",
+    "training.seed",
+    "result.frames",
+    "result.resolution",
+];
+
+/// The number of the line that gives a key its value, as it counts or as a comment.
+fn line_of(recipe: &str, key: &str) -> Option<usize> {
+    let begins = format!("{key} = ");
+    let mut lines = recipe.lines();
+    lines.position(|line| line.trim_start_matches(['#', ' ']).starts_with(&begins))
+}
+
 #[test]
 fn the_recipe_that_init_prints_trains() {
     let _turn = turn();
@@ -285,20 +314,19 @@ fn the_recipe_that_init_prints_trains() {
         "same-vertices",
     ];
     let printed = place.isomorph(&init).succeeded().stdout;
-    // Every section is there, explained.
-    for section in [
-        "data",
-        "implicit",
-        "velocity",
-        "loss",
-        "training",
-        "checkpoint",
-        "result",
+    let at = |key: &str| line_of(&printed, key).unwrap_or_else(|| panic!("no {key} in {printed}"));
+    // The shapes, then the ten keys that people change, then the rest of the method, all of it explained.
+    let first = FIRST.map(at);
+    assert!(first.is_sorted(), "{first:?} in {printed}");
+    assert!(at("data.source") < first[0] && at("data.target") < first[0]);
+    for key in [
+        "data.points",
+        "implicit.depth",
+        "velocity.width",
+        "loss.screw",
+        "checkpoint.every",
     ] {
-        assert!(
-            printed.contains(&format!("\n[{section}]\n")),
-            "no [{section}] in {printed}"
-        );
+        assert!(at(key) > first[9], "{key} among the first in {printed}");
     }
     assert!(
         printed
@@ -308,11 +336,25 @@ fn the_recipe_that_init_prints_trains() {
             > 50,
         "{printed}"
     );
-    place.write("pair.toml", &printed);
-    let small = ["--set", "training.steps=3", "--set", "training.batch=64"];
-    let train = ["train", "pair.toml", "--quiet", "--run", "run"];
-    place
-        .isomorph(&[&train[..], &small, SURFACES].concat())
-        .succeeded();
-    assert_eq!(place.run("run").step(), 3);
+    // Of other geometries and methods nothing, until it is wanted.
+    let others = ["loss.level-set", "nfgp.deformations", "nise.omega"];
+    assert!(others.iter().all(|key| line_of(&printed, key).is_none()));
+    let all = place
+        .isomorph(&[&init[..], &["--all"]].concat())
+        .succeeded()
+        .stdout;
+    assert!(
+        others.iter().all(|key| line_of(&all, key).is_some()),
+        "{all}"
+    );
+    for (name, text) in [("pair", &printed), ("all", &all)] {
+        let recipe = format!("{name}.toml");
+        place.write(&recipe, text);
+        let small = ["--set", "training.steps=3", "--set", "training.batch=64"];
+        let train = ["train", &recipe, "--quiet", "--run", name];
+        place
+            .isomorph(&[&train[..], &small, SURFACES].concat())
+            .succeeded();
+        assert_eq!(place.run(name).step(), 3);
+    }
 }

@@ -3,19 +3,19 @@
 use std::collections::{HashMap, HashSet};
 
 /// A point or a vector.
-pub type Point = [f64; 3];
+pub(crate) type Point = [f64; 3];
 
 /// Vertices and counter-clockwise triangles.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Mesh {
-    pub vertices: Vec<Point>,
-    pub triangles: Vec<[u32; 3]>,
+pub(crate) struct Mesh {
+    pub(crate) vertices: Vec<Point>,
+    pub(crate) triangles: Vec<[u32; 3]>,
 }
 
 impl Mesh {
     /// The octahedron, each triangle cut in four `cuts` times and pushed out to the sphere of a radius
     /// around the origin: 4^cuts * 4 + 2 vertices. Five cuts hold 99.8 % of the ball.
-    pub fn sphere(radius: f64, cuts: usize) -> Self {
+    pub(crate) fn sphere(radius: f64, cuts: usize) -> Self {
         let axes = [0, 1, 2, 3, 4, 5];
         let mut vertices: Vec<Point> = Vec::from(axes.map(|k| {
             let mut corner = [0.0; 3];
@@ -56,7 +56,7 @@ impl Mesh {
     }
 
     /// A box around the origin with edges along the axes, each face cut into squares of side `cell`.
-    pub fn bar(edges: Point, cell: f64) -> Self {
+    pub(crate) fn bar(edges: Point, cell: f64) -> Self {
         let counts = edges.map(|edge| (edge / cell).round() as usize);
         let mut numbers = HashMap::new();
         let mut mesh = Self::default();
@@ -88,7 +88,7 @@ impl Mesh {
     }
 
     /// The same triangles with every vertex moved.
-    pub fn map(self, move_to: impl Fn(Point) -> Point) -> Self {
+    pub(crate) fn map(self, move_to: impl Fn(Point) -> Point) -> Self {
         Self {
             vertices: self.vertices.into_iter().map(move_to).collect(),
             ..self
@@ -96,7 +96,7 @@ impl Mesh {
     }
 
     /// The volume inside; positive where the triangles are counter-clockwise seen from outside.
-    pub fn volume(&self) -> f64 {
+    pub(crate) fn volume(&self) -> f64 {
         let corners = |triangle: &[u32; 3]| triangle.map(|index| self.vertices[index as usize]);
         let signed = self.triangles.iter().map(|triangle| {
             let [a, b, c] = corners(triangle);
@@ -113,7 +113,7 @@ impl Mesh {
     }
 
     /// Whether every edge has one triangle on each side, turned the same way.
-    pub fn is_closed(&self) -> bool {
+    pub(crate) fn is_closed(&self) -> bool {
         let edges = self
             .triangles
             .iter()
@@ -124,7 +124,7 @@ impl Mesh {
     }
 
     /// How many pieces the triangles form.
-    pub fn components(&self) -> usize {
+    pub(crate) fn components(&self) -> usize {
         let mut parent: Vec<usize> = (0..self.vertices.len()).collect();
         fn root(parent: &mut [usize], mut x: usize) -> usize {
             while parent[x] != x {
@@ -156,28 +156,28 @@ impl Mesh {
 }
 
 /// `|v|`.
-pub fn length(v: Point) -> f64 {
+pub(crate) fn length(v: Point) -> f64 {
     dot(v, v).sqrt()
 }
 
 /// `a . b`.
-pub fn dot(a: Point, b: Point) -> f64 {
+pub(crate) fn dot(a: Point, b: Point) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// `|a - b|`.
-pub fn distance(a: Point, b: Point) -> f64 {
+pub(crate) fn distance(a: Point, b: Point) -> f64 {
     length(std::array::from_fn(|axis| a[axis] - b[axis]))
 }
 
 /// `x` turned about the z axis.
-pub fn turned(x: Point, angle: f64) -> Point {
+pub(crate) fn turned(x: Point, angle: f64) -> Point {
     let (sin, cos) = angle.sin_cos();
     [cos * x[0] - sin * x[1], sin * x[0] + cos * x[1], x[2]]
 }
 
 /// The distance from `x` to the surface of a box around the origin with edges along the axes.
-pub fn distance_to_bar(x: Point, edges: Point) -> f64 {
+pub(crate) fn distance_to_bar(x: Point, edges: Point) -> f64 {
     let beyond: Point = std::array::from_fn(|axis| x[axis].abs() - 0.5 * edges[axis]);
     let inside = beyond
         .into_iter()

@@ -9,9 +9,9 @@
 //! | `sequence.rs` | frames of a mesh that moves, as a folder of meshes and as `.anime` |
 //! | `run.rs` | the folder of a run: checkpoints, metrics, frames |
 
-pub mod command;
-pub mod mesh;
-pub mod ply;
-pub mod run;
-pub mod sequence;
-pub mod workplace;
+pub(crate) mod command;
+pub(crate) mod mesh;
+pub(crate) mod ply;
+pub(crate) mod run;
+pub(crate) mod sequence;
+pub(crate) mod workplace;

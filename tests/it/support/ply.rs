@@ -8,16 +8,16 @@ use super::mesh::{Mesh, Point};
 
 /// What a file holds: all numbers of its vertices by property, and its triangles.
 #[derive(Debug)]
-pub struct Ply {
-    pub properties: Vec<String>,
+pub(crate) struct Ply {
+    pub(crate) properties: Vec<String>,
     /// One row per vertex, one number per property.
-    pub rows: Vec<Vec<f64>>,
-    pub triangles: Vec<[u32; 3]>,
+    pub(crate) rows: Vec<Vec<f64>>,
+    pub(crate) triangles: Vec<[u32; 3]>,
 }
 
 impl Ply {
     /// Reads a file whose faces, if any, are triangles and their only property.
-    pub fn read(path: &Path) -> Self {
+    pub(crate) fn read(path: &Path) -> Self {
         let bytes =
             std::fs::read(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
         let end = b"end_header\n";
@@ -70,14 +70,14 @@ impl Ply {
     }
 
     /// A property of every vertex.
-    pub fn column(&self, name: &str) -> Vec<f64> {
+    pub(crate) fn column(&self, name: &str) -> Vec<f64> {
         let at = self.properties.iter().position(|known| known == name);
         let at = at.unwrap_or_else(|| panic!("no property {name} among {:?}", self.properties));
         self.rows.iter().map(|row| row[at]).collect()
     }
 
     /// Positions and triangles.
-    pub fn mesh(&self) -> Mesh {
+    pub(crate) fn mesh(&self) -> Mesh {
         let [x, y, z] = ["x", "y", "z"].map(|axis| self.column(axis));
         let vertices = (0..x.len()).map(|k| [x[k], y[k], z[k]]).collect();
         Mesh {
@@ -129,13 +129,13 @@ impl Numbers<'_> {
 }
 
 /// A mesh as text.
-pub fn text(mesh: &Mesh) -> String {
+pub(crate) fn text(mesh: &Mesh) -> String {
     let rows: Vec<String> = mesh.vertices.iter().map(|x| words(*x)).collect();
     text_of(&["float x", "float y", "float z"], &rows, &mesh.triangles)
 }
 
 /// A cloud of points as text.
-pub fn cloud(points: &[Point]) -> String {
+pub(crate) fn cloud(points: &[Point]) -> String {
     text(&Mesh {
         vertices: points.to_vec(),
         triangles: Vec::new(),
@@ -143,7 +143,7 @@ pub fn cloud(points: &[Point]) -> String {
 }
 
 /// Vertex rows and triangles as text, with the properties of the vertices as they stand in the header.
-pub fn text_of(properties: &[&str], rows: &[String], triangles: &[[u32; 3]]) -> String {
+pub(crate) fn text_of(properties: &[&str], rows: &[String], triangles: &[[u32; 3]]) -> String {
     let mut text = format!("ply\nformat ascii 1.0\nelement vertex {}\n", rows.len());
     for property in properties {
         writeln!(text, "property {property}").expect("strings take all text");
@@ -163,6 +163,6 @@ pub fn text_of(properties: &[&str], rows: &[String], triangles: &[[u32; 3]]) -> 
 }
 
 /// Numbers as the words of a line.
-pub fn words(x: Point) -> String {
+pub(crate) fn words(x: Point) -> String {
     x.map(|part| part.to_string()).join(" ")
 }

@@ -8,11 +8,11 @@ use super::workplace::Workplace;
 
 /// The frames, all with the same triangles.
 #[derive(Clone, Debug)]
-pub struct Sequence(pub Vec<Mesh>);
+pub(crate) struct Sequence(pub(crate) Vec<Mesh>);
 
 impl Sequence {
     /// A mesh that moves along x by `way`, in `frames - 1` even steps.
-    pub fn moving(mesh: &Mesh, way: f64, frames: usize) -> Self {
+    pub(crate) fn moving(mesh: &Mesh, way: f64, frames: usize) -> Self {
         let frame = |k: usize| {
             let gone = way * k as f64 / (frames - 1) as f64;
             mesh.clone().map(|x| [x[0] + gone, x[1], x[2]])
@@ -22,19 +22,19 @@ impl Sequence {
 
     /// The sphere of `Workplace::tiny` from its source, frame 0, to its target, frame 4. Its coordinates
     /// are whole multiples of 1/1024, so that they and their differences are exact in every file.
-    pub fn tiny() -> Self {
+    pub(crate) fn tiny() -> Self {
         let rounded = |x: Point| x.map(|part| (part * 1024.0).round() / 1024.0);
         Self::moving(&Mesh::sphere(1.0, 3).map(rounded), 1.0, 5)
     }
 
     /// Every frame with every vertex moved.
-    pub fn map(self, move_to: impl Fn(Point) -> Point) -> Self {
+    pub(crate) fn map(self, move_to: impl Fn(Point) -> Point) -> Self {
         let frames = self.0.into_iter();
         Self(frames.map(|frame| frame.map(&move_to)).collect())
     }
 
     /// Writes a folder of PLY meshes; more than ten have names that sort as text in another order.
-    pub fn write_folder(&self, place: &Workplace, name: &str) {
+    pub(crate) fn write_folder(&self, place: &Workplace, name: &str) {
         fs::create_dir_all(place.path(name)).expect("a folder");
         for (k, frame) in self.0.iter().enumerate() {
             place.write(&format!("{name}/frame-{k}.ply"), ply::text(frame));
@@ -43,7 +43,7 @@ impl Sequence {
 
     /// The bytes of a `.anime` file: counts, the vertices of frame 0, triangles, and the way of every
     /// vertex from frame 0 to each later frame; little-endian, 32 bits each.
-    pub fn anime(&self) -> Vec<u8> {
+    pub(crate) fn anime(&self) -> Vec<u8> {
         let first = &self.0[0];
         let counts = [self.0.len(), first.vertices.len(), first.triangles.len()];
         let mut bytes: Vec<u8> = Vec::new();

@@ -9,17 +9,18 @@ use super::ply;
 use super::run::Run;
 
 /// A temporary folder; it goes away with everything in it.
-pub struct Workplace(tempfile::TempDir);
+pub(crate) struct Workplace(tempfile::TempDir);
 
 impl Workplace {
     /// An empty one.
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self(tempfile::tempdir().expect("a temporary folder"))
     }
 
     /// One with `source.ply`, `target.ply` and `recipe.toml`: the two shapes, equal in their vertices,
-    /// and `preset = "quick"` with [`NETWORK`] and more keys, each as in `training.steps=20`.
-    pub fn with_pair(source: &Mesh, target: &Mesh, keys: &[&str]) -> Self {
+    /// and `preset = "quick"` with keys, each as in `training.steps=20`. Of keys that are given twice the
+    /// last one counts.
+    pub(crate) fn with_pair(source: &Mesh, target: &Mesh, keys: &[&str]) -> Self {
         let place = Self::new();
         place.write("source.ply", ply::text(source));
         place.write("target.ply", ply::text(target));
@@ -30,40 +31,47 @@ impl Workplace {
             recipe.push_str("data.correspondences = \"same-vertices\"\n");
         }
         let name = |key: &str| key.split([' ', '=']).next().map(str::to_owned);
-        let given = |key: &str| keys.iter().any(|other| name(other) == name(key));
-        let network = NETWORK.iter().filter(|key| !given(key));
-        for key in network.chain(keys) {
-            recipe.push_str(key);
-            recipe.push('\n');
+        for (at, key) in keys.iter().enumerate() {
+            if keys[at + 1..].iter().all(|later| name(later) != name(key)) {
+                recipe.push_str(key);
+                recipe.push('\n');
+            }
         }
         place.write("recipe.toml", &recipe);
         place
     }
 
-    /// A small sphere that moves by its radius and learns in milliseconds per step.
-    pub fn tiny(keys: &[&str]) -> Self {
+    /// A small sphere that moves by its radius and learns in milliseconds per step, with the preset `quick`
+    /// as it ships, only smaller.
+    pub(crate) fn tiny(keys: &[&str]) -> Self {
+        Self::tiny_with(TINY, keys)
+    }
+
+    /// The same with other sizes: a method other than the default one has other networks, and a recipe holds
+    /// no key that does nothing.
+    pub(crate) fn tiny_with(sizes: &[&str], keys: &[&str]) -> Self {
         let sphere = Mesh::sphere(1.0, 3);
         let target = sphere.clone().map(|x| [x[0] + 1.0, x[1], x[2]]);
-        Self::with_pair(&sphere, &target, &[TINY, keys].concat())
+        Self::with_pair(&sphere, &target, &[sizes, keys].concat())
     }
 
     /// The path of a file in it.
-    pub fn path(&self, name: &str) -> PathBuf {
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
         self.0.path().join(name)
     }
 
     /// Writes a file into it.
-    pub fn write(&self, name: &str, content: impl AsRef<[u8]>) {
+    pub(crate) fn write(&self, name: &str, content: impl AsRef<[u8]>) {
         std::fs::write(self.path(name), content).expect("a file in a temporary folder");
     }
 
     /// A run in it.
-    pub fn run(&self, name: &str) -> Run {
+    pub(crate) fn run(&self, name: &str) -> Run {
         Run(self.path(name))
     }
 
     /// The program with arguments, to be started in the folder.
-    pub fn command(&self, arguments: &[&str]) -> Command {
+    pub(crate) fn command(&self, arguments: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_isomorph"));
         command
             .current_dir(self.0.path())
@@ -73,7 +81,7 @@ impl Workplace {
     }
 
     /// Runs the program with arguments to its end.
-    pub fn isomorph(&self, arguments: &[&str]) -> Ended {
+    pub(crate) fn isomorph(&self, arguments: &[&str]) -> Ended {
         Ended::from(
             self.command(arguments)
                 .output()
@@ -82,7 +90,7 @@ impl Workplace {
     }
 
     /// Runs the program on one thread, where the order of every sum is fixed.
-    pub fn on_one_thread(&self, arguments: &[&str]) -> Ended {
+    pub(crate) fn on_one_thread(&self, arguments: &[&str]) -> Ended {
         let mut command = self.command(arguments);
         Ended::from(
             command
@@ -93,21 +101,24 @@ impl Workplace {
     }
 
     /// Runs `train recipe.toml` into a run, with more arguments, and holds it to success.
-    pub fn train(&self, run: &str, arguments: &[&str]) -> Run {
+    pub(crate) fn train(&self, run: &str, arguments: &[&str]) -> Run {
         let fixed = ["train", "recipe.toml", "--quiet", "--run", run];
         self.isomorph(&[&fixed, arguments].concat()).succeeded();
         self.run(run)
     }
 
     /// The names in the folder, in order.
-    pub fn names(&self) -> Vec<String> {
+    pub(crate) fn names(&self) -> Vec<String> {
         names(self.0.path())
     }
 }
 
-/// The paper's geometry, on which most tests were made: one network `f(x, t)` of softplus with all phases of
-/// training, and a stationary `V`. Keys that a test gives itself go before these.
-const NETWORK: &[&str] = &[
+/// The product as it ships: `quick` with nothing changed.
+pub(crate) const SHIPPED: &[&str] = &[];
+
+/// The paper's geometry, a second column beside [`SHIPPED`]: one network `f(x, t)` of softplus with all phases
+/// of training, and a stationary `V`. A test puts these before its own keys.
+pub(crate) const NETWORK: &[&str] = &[
     "implicit.geometry = \"network\"",
     "implicit.activation = \"softplus\"",
     "implicit.beta = 100",
@@ -119,7 +130,10 @@ const NETWORK: &[&str] = &[
     "training.time-steps = 3",
 ];
 
-/// Keys with which a step takes milliseconds.
+/// Both, with their names.
+pub(crate) const COLUMNS: [(&str, &[&str]); 2] = [("shipped", SHIPPED), ("network", NETWORK)];
+
+/// Sizes with which a step takes milliseconds; all of them act in both columns.
 const TINY: &[&str] = &[
     "implicit.depth = 3",
     "implicit.width = 32",
@@ -132,7 +146,7 @@ const TINY: &[&str] = &[
 ];
 
 /// The names in a folder, in order.
-pub fn names(folder: &Path) -> Vec<String> {
+pub(crate) fn names(folder: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(folder).expect("a folder");
     let name = |entry: std::io::Result<std::fs::DirEntry>| entry.expect("an entry").file_name();
     let mut names: Vec<String> = entries
@@ -144,11 +158,11 @@ pub fn names(folder: &Path) -> Vec<String> {
 
 /// How a command ended.
 #[derive(Debug)]
-pub struct Ended {
+pub(crate) struct Ended {
     /// Its exit status; `None` if a signal ended it.
-    pub code: Option<i32>,
-    pub stdout: String,
-    pub stderr: String,
+    pub(crate) code: Option<i32>,
+    pub(crate) stdout: String,
+    pub(crate) stderr: String,
 }
 
 impl From<Output> for Ended {
@@ -164,14 +178,14 @@ impl From<Output> for Ended {
 impl Ended {
     /// Holds the command to success.
     #[track_caller]
-    pub fn succeeded(self) -> Self {
+    pub(crate) fn succeeded(self) -> Self {
         assert_eq!(self.code, Some(0), "{self:?}");
         self
     }
 
     /// Holds the command to one line of error with these parts in it, nothing else, and this status.
     #[track_caller]
-    pub fn refused(&self, code: i32, parts: &[&str]) {
+    pub(crate) fn refused(&self, code: i32, parts: &[&str]) {
         assert_eq!(self.code, Some(code), "{self:?}");
         assert_eq!(self.stdout, "", "results of a command that failed");
         assert!(
@@ -200,7 +214,7 @@ impl Ended {
 }
 
 /// Tests that train do so one after the other, since each uses all cores.
-pub fn turn() -> MutexGuard<'static, ()> {
+pub(crate) fn turn() -> MutexGuard<'static, ()> {
     static TURN: Mutex<()> = Mutex::new(());
     // A test that failed in its turn has nothing to leave in disorder.
     TURN.lock().unwrap_or_else(PoisonError::into_inner)

@@ -1,0 +1,211 @@
+//! A run that is killed or interrupted loses nothing, and ends in the same networks as one that never stopped.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Child, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use crate::resume::{assert_same, logged, resume_on_one_thread, whole_on_one_thread};
+use crate::support::workplace::{Workplace, turn};
+
+/// A run of a second or more that can be stopped in the middle.
+const LONGER: &[&str] = &[
+    "training.steps = 1000",
+    "training.log-every = 3",
+    "checkpoint.every = 25",
+    "checkpoint.keep = 2",
+];
+
+/// Starts a command on one thread and lets it run.
+fn start(place: &Workplace, arguments: &[&str]) -> Child {
+    let mut command = place.command(arguments);
+    command
+        .env("RAYON_NUM_THREADS", "1")
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped());
+    command.spawn().expect("the program starts")
+}
+
+/// Waits for its end, and what it wrote to standard error.
+fn end(child: Child) -> Output {
+    child.wait_with_output().expect("a child")
+}
+
+const TRAIN: &[&str] = &[
+    "train",
+    "recipe.toml",
+    "--quiet",
+    "--run",
+    "run",
+    "--backend",
+    "flex",
+];
+const RESUME: &[&str] = &["resume", "run", "--quiet", "--backend", "flex"];
+
+/// Waits until something is there; a minute is far more than it takes.
+fn wait_until(what: &str, is_there: impl Fn() -> bool) {
+    let start = Instant::now();
+    while !is_there() {
+        assert!(
+            start.elapsed() < Duration::from_secs(60),
+            "{what} does not come"
+        );
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+fn holds_a_line(path: &Path) -> bool {
+    fs::read(path).is_ok_and(|bytes| bytes.contains(&b'\n'))
+}
+
+#[test]
+fn a_run_killed_again_and_again_ends_in_the_same_networks() {
+    let _turn = turn();
+    let place = Workplace::tiny(LONGER);
+    let whole = whole_on_one_thread(&place, "flex");
+    // Times that have nothing to do with those of steps and checkpoints; the first falls before
+    // training begins, the later ones anywhere.
+    let delays = [11, 283, 347, 419, 307, 521, 379];
+    let mut killed = 0;
+    for (attempt, delay) in delays.into_iter().enumerate() {
+        // Killed before it had written its recipe, it is no run yet.
+        let begun = place.path("run/recipe.toml").exists();
+        let mut child = start(&place, if begun { RESUME } else { TRAIN });
+        std::thread::sleep(Duration::from_millis(delay));
+        if child.try_wait().expect("a child").is_some() {
+            assert!(
+                attempt > 2,
+                "the run ended before it was killed {attempt} times"
+            );
+            break;
+        }
+        child.kill().expect("SIGKILL");
+        child.wait().expect("a child that was killed");
+        killed += 1;
+    }
+    println!("killed {killed} times");
+    assert!(killed >= 3, "killed {killed} times only");
+    resume_on_one_thread(&place, "run", "flex");
+    let run = place.run("run");
+    assert_eq!(run.logged_steps(), logged(1000, 25));
+    assert_eq!(
+        run.checkpoints(),
+        ["step-000975", "step-001000"],
+        "nothing torn is left"
+    );
+    assert_same(&run, &whole);
+}
+
+#[test]
+fn a_run_killed_before_its_first_checkpoint_starts_again() {
+    let _turn = turn();
+    let place = Workplace::tiny(LONGER);
+    let whole = whole_on_one_thread(&place, "flex");
+    let never = ["--set", "checkpoint.every=100000"];
+    let mut child = start(&place, &[TRAIN, &never].concat());
+    let run = place.run("run");
+    wait_until("the first line of the metrics", || {
+        holds_a_line(&run.path("metrics.jsonl"))
+    });
+    child.kill().expect("SIGKILL");
+    child.wait().expect("a child that was killed");
+    assert!(!run.path("checkpoints").exists() || run.checkpoints().is_empty());
+    let set = [
+        "resume",
+        "run",
+        "--backend",
+        "flex",
+        "--set",
+        "checkpoint.every=25",
+    ];
+    let ended = place.on_one_thread(&set).succeeded();
+    assert!(
+        ended.stderr.contains("no checkpoint yet"),
+        "{}",
+        ended.stderr
+    );
+    assert_same(&run, &whole);
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupt_leaves_a_checkpoint_of_the_present_step_and_exits_130() {
+    use nix::sys::signal::{Signal, kill};
+    use nix::unistd::Pid;
+
+    let _turn = turn();
+    let place = Workplace::tiny(LONGER);
+    let whole = whole_on_one_thread(&place, "flex");
+    let never = ["--set", "checkpoint.every=100000"];
+    for (signal, name) in [
+        (Signal::SIGINT, "interrupted"),
+        (Signal::SIGTERM, "terminated"),
+    ] {
+        let train = [
+            "train",
+            "recipe.toml",
+            "--quiet",
+            "--run",
+            name,
+            "--backend",
+            "flex",
+        ];
+        let child = start(&place, &[&train[..], &never].concat());
+        let run = place.run(name);
+        wait_until("a few steps", || holds_a_line(&run.path("metrics.jsonl")));
+        let pid = i32::try_from(child.id()).expect("a process number");
+        kill(Pid::from_raw(pid), signal).expect("a signal");
+        let ended = end(child);
+        assert_eq!(ended.status.code(), Some(130), "{signal}");
+        // What was done is in the checkpoint: no error, and nothing to say with --quiet.
+        let told = String::from_utf8_lossy(&ended.stderr);
+        assert_eq!(told, "", "{signal}");
+        let step = run.step();
+        assert!(
+            (1..1000).contains(&step),
+            "{signal}: stopped at step {step}"
+        );
+        assert!(run.logged_steps().iter().all(|logged| *logged <= step));
+        let log = fs::read_to_string(run.path("run.log")).expect("a log");
+        assert!(
+            log.lines()
+                .last()
+                .is_some_and(|line| line.contains(&step.to_string())),
+            "{log}"
+        );
+        let set = [
+            "resume",
+            name,
+            "--quiet",
+            "--backend",
+            "flex",
+            "--set",
+            "checkpoint.every=25",
+        ];
+        place.on_one_thread(&set).succeeded();
+        assert_same(&run, &whole);
+    }
+}
+
+/// Without `--quiet` the last line says what to do, and is no error either.
+#[cfg(unix)]
+#[test]
+fn an_interrupt_says_how_to_go_on() {
+    use nix::sys::signal::{Signal, kill};
+    use nix::unistd::Pid;
+
+    let _turn = turn();
+    let place = Workplace::tiny(LONGER);
+    let train = ["train", "recipe.toml", "--run", "run", "--backend", "flex"];
+    let child = start(&place, &train);
+    let metrics = place.run("run").path("metrics.jsonl");
+    wait_until("a few steps", || holds_a_line(&metrics));
+    let pid = i32::try_from(child.id()).expect("a process number");
+    kill(Pid::from_raw(pid), Signal::SIGINT).expect("a signal");
+    let ended = end(child);
+    assert_eq!(ended.status.code(), Some(130));
+    let told = String::from_utf8_lossy(&ended.stderr);
+    let last = told.lines().last().expect("a line");
+    assert!(last.contains("isomorph resume run"), "{told}");
+    assert!(!told.contains("error:"), "{told}");
+}
