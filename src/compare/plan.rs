@@ -20,14 +20,14 @@ const LONGEST_LABEL: usize = 48;
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum PlanError {
     /// Not a pair of frames.
-    #[error("--pairs {given}: must be FROM-TO, several separated by commas (such as 0-18,20-47)")]
+    #[error("pairs {given}: must be FROM-TO, several separated by commas (such as 0-18,20-47)")]
     NotAPair {
         /// The piece that is none.
         given: String,
     },
     /// No frame lies between the two.
     #[error(
-        "--pairs {pair}: nothing lies between the two frames; TO must be at least FROM + 2 (here {})",
+        "pairs {pair}: nothing lies between the two frames; TO must be at least FROM + 2 (here {})",
         pair.from.saturating_add(2)
     )]
     NothingBetween {
@@ -36,7 +36,7 @@ pub enum PlanError {
     },
     /// The sequence is shorter.
     #[error(
-        "--pairs {pair}: {sequence} has {frames} frames, 0 to {}; choose among them",
+        "pairs {pair}: {sequence} has {frames} frames, 0 to {}; choose among them",
         frames.saturating_sub(1)
     )]
     PastTheEnd {
@@ -49,8 +49,8 @@ pub enum PlanError {
     },
     /// No pairs were given.
     #[error(
-        "--pairs is missing: {sequence} has {frames} frames, 0 to {}; give the first and the last \
-         frame of each pair, such as --pairs 0-10,10-20",
+        "pairs are missing: {sequence} has {frames} frames, 0 to {}; give the first and the last \
+         frame of each pair, such as pairs 0-10,10-20",
         frames.saturating_sub(1)
     )]
     NoPairs {
@@ -72,7 +72,7 @@ pub enum PlanError {
         known: String,
     },
     /// A variant that is not label, method and overrides.
-    #[error("--variant {given}: {problem}; write 'LABEL=METHOD,section.key=value,...'")]
+    #[error("variant {given}: {problem}; write 'LABEL=METHOD,section.key=value,...'")]
     Variant {
         /// The argument.
         given: String,
@@ -95,7 +95,7 @@ pub enum PlanError {
         word: String,
     },
     /// No method at all.
-    #[error("--methods is missing: nothing to compare ({known})")]
+    #[error("methods are missing: nothing to compare ({known})")]
     NoMethods {
         /// All that there are.
         known: String,
@@ -201,7 +201,7 @@ fn pairs(request: &Request<'_>) -> Result<Vec<FramePair>, PlanError> {
             });
         }
         if pairs[..place].contains(pair) {
-            let given = format!("--pairs {pair}");
+            let given = format!("pairs {pair}");
             return Err(PlanError::Twice { given });
         }
     }
@@ -227,12 +227,12 @@ fn methods(request: &Request<'_>) -> Result<Vec<MethodPlan>, PlanError> {
     let words = request.methods.unwrap_or_default().split(',');
     let mut methods = Vec::new();
     for word in words.map(str::trim).filter(|word| !word.is_empty()) {
-        let given = format!("--methods {word}");
+        let given = format!("methods {word}");
         methods.push((plain(&given, word, request.known)?, given));
     }
     for text in request.variants {
         let variant = variant(text, request.known)?;
-        methods.push((variant, format!("--variant {text}")));
+        methods.push((variant, format!("variant {text}")));
     }
     if methods.is_empty() {
         let known = request.known.join(", ");
@@ -282,7 +282,7 @@ fn variant(text: &str, known: &[&str]) -> Result<MethodPlan, PlanError> {
     if label.chars().any(char::is_control) {
         return Err(refused("the label holds a control character".to_owned()));
     }
-    let given = format!("--variant {text}");
+    let given = format!("variant {text}");
     refuse_reserved(&given, label)?;
     let (method, changes) = match rest.split_once(',') {
         Some((method, changes)) => (method.trim(), overrides(changes)),

@@ -42,8 +42,8 @@ fn pairs_must_be_given() {
     let refused = refusal(None, Some("quick"), &[]);
     assert_eq!(
         refused,
-        "--pairs is missing: fox_survey has 55 frames, 0 to 54; give the first and the last frame of \
-         each pair, such as --pairs 0-10,10-20"
+        "pairs are missing: fox_survey has 55 frames, 0 to 54; give the first and the last frame of \
+         each pair, such as pairs 0-10,10-20"
     );
 }
 
@@ -65,7 +65,7 @@ fn what_is_no_pair_is_refused() {
     let refused = refusal(Some("0-18,0-18"), Some("quick"), &[]);
     assert_eq!(
         refused,
-        "--pairs 0-18 is given twice; each must be there once"
+        "pairs 0-18 is given twice; each must be there once"
     );
 }
 
@@ -89,7 +89,7 @@ fn a_typing_error_is_answered_with_the_nearest_method() {
     let refused = refusal(PAIR, Some("quick,lipmpl"), &[]);
     assert_eq!(
         refused,
-        "--methods lipmpl: no such method \"lipmpl\"; did you mean lipmlp? \
+        "methods lipmpl: no such method \"lipmpl\"; did you mean lipmlp? \
          (quick, default, paper, lipmlp, nise, eigenbasis)"
     );
     let refused = refusal(PAIR, Some("zzz"), &[]);
@@ -134,7 +134,7 @@ fn a_label_is_there_once_whatever_its_case() {
 fn nothing_to_compare_is_refused() {
     for methods in [None, Some(""), Some(" , ")] {
         let refused = refusal(PAIR, methods, &[]);
-        assert!(refused.starts_with("--methods is missing"), "{refused}");
+        assert!(refused.starts_with("methods are missing"), "{refused}");
     }
 }
 

@@ -43,16 +43,16 @@ impl MatchOptions {
             })
         };
         if self.points < FEWEST_POINTS {
-            return refused("--points", self.points.to_string(), "64 or more");
+            return refused("points", self.points.to_string(), "64 or more");
         }
         if !(FEWEST_POINTS..=10_000).contains(&self.nodes) {
-            return refused("--nodes", self.nodes.to_string(), "64 to 10000");
+            return refused("nodes", self.nodes.to_string(), "64 to 10000");
         }
         if !(0.0..=1.0).contains(&self.least_confidence) {
-            return refused("--confidence", self.least_confidence.to_string(), "0 to 1");
+            return refused("confidence", self.least_confidence.to_string(), "0 to 1");
         }
         if self.count == Some(0) {
-            return refused("--count", "0".to_owned(), "1 or more");
+            return refused("count", "0".to_owned(), "1 or more");
         }
         Ok(())
     }

@@ -360,29 +360,29 @@ fn options_out_of_range_and_shapes_without_a_sure_pair_are_refused() {
     };
     assert_eq!(
         message(MatchOptions { nodes: 3, ..base }),
-        "--nodes 3: must be 64 to 10000"
+        "nodes 3: must be 64 to 10000"
     );
     assert_eq!(
         message(MatchOptions { points: 9, ..base }),
-        "--points 9: must be 64 or more"
+        "points 9: must be 64 or more"
     );
     let confidence = MatchOptions {
         least_confidence: f64::NAN,
         ..base
     };
-    assert_eq!(message(confidence), "--confidence NaN: must be 0 to 1");
+    assert_eq!(message(confidence), "confidence NaN: must be 0 to 1");
     let count = MatchOptions {
         count: Some(0),
         ..base
     };
-    assert_eq!(message(count), "--count 0: must be 1 or more");
+    assert_eq!(message(count), "count 0: must be 1 or more");
     let sure = MatchOptions {
         least_confidence: 1.0,
         ..base
     };
     let text = message(sure);
     assert!(
-        text.starts_with("body.ply and body.ply: no pair") && text.contains("--confidence"),
+        text.starts_with("body.ply and body.ply: no pair") && text.contains("least confidence"),
         "{text}"
     );
 }

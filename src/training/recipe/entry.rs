@@ -65,7 +65,7 @@ impl fmt::Display for Place {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Place::Line { file, line } => write!(out, "{file}:{line}"),
-            Place::Override(given) => write!(out, "--set {given}"),
+            Place::Override(given) => write!(out, "set {given}"),
             Place::Preset(preset) => write!(out, "preset \"{preset}\""),
             Place::Held => out.write_str("the recipe"),
         }

@@ -30,7 +30,7 @@ pub enum RecipeError {
         line: String,
     },
     /// An argument of `--set` has no key, no value, or neither.
-    #[error("--set {given}: must be section.key=value (such as training.steps=2000)")]
+    #[error("set {given}: must be section.key=value (such as training.steps=2000)")]
     NotAnOverride {
         /// The argument.
         given: String,

@@ -22,7 +22,7 @@ fn a_key_of_the_other_geometry_is_an_error_with_its_line_and_its_home() {
     assert!(parsed(&format!("preset = \"paper\"\n{text}"), &[]).is_ok());
     assert_eq!(
         refused(SHAPES, &["preset=paper", "loss.distance=1"]),
-        "--set loss.distance=1: does nothing in the method velocity-field with implicit.geometry = \
+        "set loss.distance=1: does nothing in the method velocity-field with implicit.geometry = \
          \"network\"; leave it out (it acts in implicit.geometry = \"flow\", method.name = \"mlp\" or \
          method.name = \"sdf-blend\")"
     );
@@ -32,7 +32,7 @@ fn a_key_of_the_other_geometry_is_an_error_with_its_line_and_its_home() {
 fn a_key_of_another_method_is_an_error_with_its_home() {
     assert_eq!(
         refused(SHAPES, &["method.name=mlp", "loss.strain=1"]),
-        "--set loss.strain=1: does nothing in the method mlp; leave it out (it acts in method.name = \
+        "set loss.strain=1: does nothing in the method mlp; leave it out (it acts in method.name = \
          \"velocity-field\")"
     );
     assert_eq!(
@@ -43,12 +43,12 @@ fn a_key_of_another_method_is_an_error_with_its_home() {
     );
     assert_eq!(
         refused(SHAPES, &["method.name=mlp", "implicit.geometry=flow"]),
-        "--set implicit.geometry=flow: does nothing in the method mlp; leave it out (it acts in \
+        "set implicit.geometry=flow: does nothing in the method mlp; leave it out (it acts in \
          method.name = \"velocity-field\")"
     );
     assert_eq!(
         refused(SHAPES, &["method.name=mlp", "loss.level-set=1"]),
-        "--set loss.level-set=1: does nothing in the method mlp; leave it out (it acts in \
+        "set loss.level-set=1: does nothing in the method mlp; leave it out (it acts in \
          method.name = \"velocity-field\" with implicit.geometry = \"network\")"
     );
 }

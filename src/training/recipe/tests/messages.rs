@@ -146,7 +146,7 @@ fn overrides_win_in_their_order_and_name_themselves_when_refused() {
              eigenbasis, nfgp, implicit, velocity, loss, training, checkpoint, result)",
         ),
     ] {
-        assert_eq!(message(&text, &[given]), format!("--set {given}: {told}"));
+        assert_eq!(message(&text, &[given]), format!("set {given}: {told}"));
     }
 }
 
@@ -160,7 +160,7 @@ fn values_that_exclude_each_other_name_both_keys_and_lines() {
     );
     assert_eq!(
         message(SHAPES, &["training.ramp-until=0.1"]),
-        "--set training.ramp-until=0.1: must be at least training.warm-up = 0.3 (preset \
+        "set training.ramp-until=0.1: must be at least training.warm-up = 0.3 (preset \
          \"default\"); change one of the two"
     );
     assert_eq!(
@@ -178,7 +178,7 @@ fn what_a_method_lacks_is_told_with_the_cure() {
     };
     assert_eq!(
         refused(&["method.name=lipmlp", "data.normals=none"]),
-        "--set data.normals=none: the method \"lipmlp\" is trained on the normals of the shapes; set it \
+        "set data.normals=none: the method \"lipmlp\" is trained on the normals of the shapes; set it \
          to \"auto\", or choose another method.name"
     );
     let text = refused(&["method.name=eigenbasis"]);

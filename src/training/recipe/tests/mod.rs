@@ -154,7 +154,7 @@ fn a_changed_key_leaves_the_others_and_drops_what_the_new_method_does_not_use() 
         .expect_err("idle")
         .to_string();
     assert!(
-        told.starts_with("--set loss.level-set=3: does nothing"),
+        told.starts_with("set loss.level-set=3: does nothing"),
         "{told}"
     );
     assert_eq!(recipe, before);
