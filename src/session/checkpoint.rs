@@ -84,7 +84,9 @@ pub enum CheckpointError {
         reason: io::Error,
     },
     /// There is none to start from.
-    #[error("{0}: no checkpoint here: the run stopped before its first one, or was moved without them; train again")]
+    #[error(
+        "{0}: no checkpoint here: the run stopped before its first one, or was moved without them; train again"
+    )]
     None(PathBuf),
     /// A file is not what was written.
     #[error(
