@@ -123,8 +123,8 @@ fn matched(event: &Event) -> Option<String> {
         return None;
     };
     Some(format!(
-        "matched {} in {}: near {:.0} % of the source and {:.0} % of the target; there and back within \
-         {median:.4} (median) and {most:.4} (95 %) of normalised length",
+        "matched {} in {}: near {:.0} % of the source and {:.0} % of the target; round-trip error \
+         {median:.4} (median) and {most:.4} (95 %), normalised",
         counted(*pairs, "pair"),
         duration(*seconds),
         100.0 * source,
@@ -171,10 +171,10 @@ fn extracted(event: &Event) -> Option<String> {
         counted(*components, "component"),
     );
     if *left_out > 0 {
-        text += &format!(" ({left_out} small left out)");
+        text += &format!(" ({left_out} small dropped)");
     }
     if let Some(off) = consistency {
-        text += &format!(", {} off the motion", significant(*off));
+        text += &format!(", consistency {}", significant(*off));
     }
     text += &format!(": {}", path.display());
     if *triangles == 0 {

@@ -99,7 +99,7 @@ fn an_extraction_says_what_is_wrong_with_the_surface() {
     );
     assert_eq!(
         text(extracted(2048, 2, Some(0.00123), false)),
-        "time 0.250: 1,026 vertices, 2,048 triangles, 1 component (2 small left out), 0.00123 off the motion: meshes/a.ply"
+        "time 0.250: 1,026 vertices, 2,048 triangles, 1 component (2 small dropped), consistency 0.00123: meshes/a.ply"
     );
     assert!(
         text(extracted(0, 0, None, false)).ends_with("; f has no zero in the box at this time")
@@ -119,8 +119,8 @@ fn the_other_events_read_like_this() {
     };
     assert_eq!(
         text(matched),
-        "matched 3,812 pairs in 18s: near 97 % of the source and 100 % of the target; there and back \
-         within 0.0017 (median) and 0.0123 (95 %) of normalised length"
+        "matched 3,812 pairs in 18s: near 97 % of the source and 100 % of the target; \
+         round-trip error 0.0017 (median) and 0.0123 (95 %), normalised"
     );
     let entered = Event::PhaseEntered {
         phase: Phase::WarmUp,

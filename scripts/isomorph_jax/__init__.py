@@ -6,8 +6,8 @@ networks.py  encoding, perceptron, the jets of f and V, trajectories
 step.py      the objective of each phase, clipping, Adam: one jitted function
 check.py     all of it against jax.jacfwd, jax.hessian and a softplus without rules of our own
 
-What is repeated here is what `src/learner/step.rs` does with the preset `paper`
-(`src/recipe/keys.rs`); whoever changes it there changes it here.
+What is repeated here is what `src/training/network_step.rs` does with the preset `paper`
+(`src/training/recipe/keys.rs`); whoever changes it there changes it here.
 """
 
 

@@ -1,13 +1,13 @@
 """What a step is made of: networks, numbers of samples, and the operations that they cost.
 
-The Python twin of `src/cli/bench.rs` (sizes), `src/learner/batch.rs` (numbers of samples) and
-`src/learner/flop.rs` (operations of the matrix products).
+The Python twin of `src/session/bench.rs` (sizes), `src/training/samples.rs` (numbers of samples) and
+`src/training/flop.rs` (operations of the matrix products).
 """
 
 import math
 from dataclasses import dataclass
 
-# The preset `paper` (third column of src/recipe/keys.rs).
+# The preset `paper` (fourth column of src/training/recipe/keys.rs).
 FREQUENCIES = 6
 BETA = 100.0
 BAND_SHARE = 0.75

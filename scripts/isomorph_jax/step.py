@@ -1,7 +1,7 @@
 """One training step: the objective's gradient by all weights, clipping, Adam; one jitted function.
 
 The terms and weights are those of the preset `paper` that are not zero, in the phases that
-`isomorph bench` times (`src/learner/step.rs`).
+`isomorph bench` times (`src/training/network_step.rs`).
 """
 
 from typing import Any

@@ -7,27 +7,27 @@ use isomorph::benchmark::{self, BenchOptions, Measured, unused};
 
 use super::{BackendArgs, Result, print};
 
-/// Measure a training step: seconds, arithmetic, memory, and the share of the machine that it uses
+/// Measure a training step: seconds, arithmetic, memory and efficiency
 ///
-/// The step is made on two spheres of points: that of the preset quick or default as it is, or that of the
-/// paper preset (smoothness with its Laplacian, divergence, level set, Euler's method) at one of three
-/// sizes. Efficiency is the rate of the step's matrix products over the rate of one large matrix product on
-/// the same backend.
+/// The shapes are two spheres of points. The step is that of the preset quick or default, or that of the
+/// preset paper at one of three sizes. The step of paper has smoothness with its Laplacian, divergence,
+/// level set, and Euler's method. Efficiency is the rate of the step's matrix products, divided by the rate
+/// of one large matrix product on the same backend.
 #[derive(Debug, Args)]
 pub(super) struct BenchArgs {
-    /// Networks and points
+    /// Preset, or size of the preset paper
     #[arg(long, value_enum, default_value_t = Size::Small)]
     size: Size,
 
-    /// How derivatives by the input are taken
+    /// How derivatives by position and time are computed
     #[arg(long, value_enum, default_value_t = Way::Nested)]
     derivatives: Way,
 
-    /// Steps timed in each phase; the median counts
+    /// Steps timed in each phase; the median is printed
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
     repeats: u32,
 
-    /// Change a value of the recipe that the step is made from, such as training.batch=8000
+    /// Override a key of the recipe of the step, such as training.batch=8000
     #[arg(long, value_name = "SECTION.KEY=VALUE")]
     set: Vec<String>,
 
@@ -41,15 +41,15 @@ pub(super) struct BenchArgs {
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum Size {
-    /// The preset quick: its networks, points and terms
+    /// Preset quick, with its networks, points and terms
     Quick,
-    /// The preset default
+    /// Preset default
     Default,
-    /// The preset paper with f and V 6x128, 1000 points, 5 time steps
+    /// Preset paper with f and V 6x128, 1000 points, 5 time steps
     Small,
-    /// The preset paper with f and V 8x256, 4086 points, 10 time steps
+    /// Preset paper with f and V 8x256, 4086 points, 10 time steps
     Shipped,
-    /// The preset paper with f 8x512, V 8x256, 4000 points, 10 time steps
+    /// Preset paper with f 8x512, V 8x256, 4000 points, 10 time steps
     Paper,
 }
 

@@ -10,26 +10,27 @@ use super::{BackendArgs, QuietArgs, Result, SetArgs, print, stop_on_interrupt};
 
 /// Compare methods on pairs of frames of a sequence, in one table and one figure
 ///
-/// Each method sees the two frames of a pair and 1000 correspondences, and is measured on the frames
-/// between. Presets of ours: quick, default, quality, paper. Others, on the networks and steps of quick: mlp,
-/// sdf-blend, lipmlp, nise, nise-velocity, eigenbasis, nfgp. A pair that is done is not done again: the
-/// command can be interrupted and repeated. Straight lines between all true vertices (linear) and the
-/// sampling floor are in every table.
+/// Each method is given the two frames of a pair and 1000 correspondences. It is measured on the frames
+/// between. Methods of isomorph are the presets quick, default, quality and paper. Other methods are mlp,
+/// sdf-blend, lipmlp, nise, nise-velocity, eigenbasis and nfgp, with the networks and steps of quick. They
+/// run on the backend flex. Finished runs are reused, so the command can be interrupted and repeated. Every
+/// table has two more rows. `linear` interpolates all true vertices on straight lines. `floor` is the noise
+/// of the samples.
 #[derive(Debug, Args)]
 pub(super) struct CompareArgs {
-    /// The frames: a .anime sequence, or a folder of meshes in the order of their names
+    /// Sequence of frames: a .anime file, or a folder of meshes in the order of their names
     #[arg(long, value_name = "SEQUENCE")]
     sequence: PathBuf,
 
-    /// Pairs of frames, as in 0-18,20-47: the first and the last frame of each, counted from 0
+    /// Pairs of frames, such as 0-18,20-47: the first and the last frame of each, counted from 0
     #[arg(long, value_name = "FROM-TO,...")]
     pairs: Option<String>,
 
-    /// Methods, as in quick,lipmlp
+    /// Methods, such as quick,lipmlp
     #[arg(long, value_name = "METHOD,...")]
     methods: Option<String>,
 
-    /// A method with changes under a label of its own, as in 'no divergence=quick,loss.divergence=0'
+    /// A method with changed keys under its own label, such as 'no divergence=quick,loss.divergence=0'
     #[arg(long = "variant", value_name = "LABEL=METHOD,KEY=VALUE,...")]
     variants: Vec<String>,
 
@@ -39,11 +40,11 @@ pub(super) struct CompareArgs {
     #[command(flatten)]
     precision: PrecisionArgs,
 
-    /// Folder for tables, figures and numbers
+    /// Output folder for tables, figures and numbers
     #[arg(long, short, value_name = "DIR", default_value = "results")]
     output: PathBuf,
 
-    /// Folder for the runs
+    /// Folder of the runs
     #[arg(long, value_name = "DIR", default_value = "runs/compare")]
     work: PathBuf,
 

@@ -9,27 +9,28 @@ use isomorph::evaluation::{EvaluateOptions, Evaluation, GroundTruth, Metrics};
 
 use super::{BackendArgs, QuietArgs, Result, print, stop_on_interrupt};
 
-/// Measure a run against the true frames between its ends
+/// Measure a run against the true frames between its two shapes
 ///
-/// The ground truth is a sequence of meshes with the same vertices, of which the run has seen two. Chamfer
-/// and Hausdorff distances, normals, volume, area, pieces, the error of carried vertices, at each frame's
-/// own time and at the best one, beside straight lines between all true vertices (linear) and two samplings
-/// of the truth (floor). Lengths are in normalised units: the mean surface area of the ends is 1. The
-/// numbers of every frame are also left in the run, in evaluation.json.
+/// The ground truth is a sequence of meshes with common vertices. The run was trained on two of them. The
+/// table shows Chamfer and Hausdorff distances, normals, volume, pieces, and the error of carried vertices.
+/// Each is measured at the frame's own time and at the best one. Two references stand beside them. `linear`
+/// interpolates all true vertices on straight lines. `floor` compares two samplings of the truth. Lengths
+/// are in normalised units, in which the mean surface area of the two shapes is 1. The numbers of every
+/// frame are also written to evaluation.json in the run.
 #[derive(Debug, Args)]
 pub(super) struct EvaluateArgs {
     /// Folder of the run
     run: PathBuf,
 
-    /// The true frames: a .anime sequence, or a folder of meshes in the order of their names
+    /// True frames: a .anime sequence, or a folder of meshes in the order of their names
     #[arg(long, value_name = "SEQUENCE")]
     ground_truth: PathBuf,
 
-    /// The frame that is the run's source, counted from 0
+    /// Frame that is the run's source, counted from 0
     #[arg(long, value_name = "FRAME")]
     from: usize,
 
-    /// The frame that is the run's target
+    /// Frame that is the run's target
     #[arg(long, value_name = "FRAME")]
     to: usize,
 
@@ -47,18 +48,18 @@ pub(super) struct EvaluateArgs {
     quiet: QuietArgs,
 }
 
-/// How closely to look.
+/// Sampling of the measurement.
 #[derive(Clone, Debug, Args)]
 pub(super) struct PrecisionArgs {
     /// Points sampled on each surface
     #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(100..=10_000_000))]
     samples: u32,
 
-    /// Evaluate each N-th frame between the ends only
+    /// Measure only every N-th frame between the ends
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     every: u32,
 
-    /// Cells along the longest side of the box in which a surface is found [default: as in the recipe]
+    /// Grid cells along the longest side of the box [default: result.resolution]
     #[arg(long, value_name = "R", value_parser = clap::value_parser!(u32).range(8..=2048))]
     resolution: Option<u32>,
 }
@@ -141,7 +142,7 @@ fn table(evaluation: &Evaluation, [from, to]: [usize; 2]) -> String {
     }
     table.push_str(
         "CD x10^3 is the squared Chamfer distance of the paper; CD and HD are not squared; aligned: at the \
-         best times; source, target: the ends that the run has seen\n",
+         best times; source, target: the ends that the run was trained on\n",
     );
     table
 }

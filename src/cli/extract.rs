@@ -7,20 +7,20 @@ use isomorph::{ExtractOptions, SurfaceFormat, Trained, even_times};
 
 use super::{BackendArgs, QuietArgs, Result, print, stop_on_interrupt};
 
-/// Write the surfaces of a trained run at any times, in any resolution
+/// Write surfaces of a trained run, at any times and in any resolution
 ///
-/// The surfaces are in the coordinates of the input, with normals, and open in MeshLab, Blender and most
-/// viewers; frames.json lists them and preview.png shows them side by side.
+/// The surfaces have normals and are in the coordinates of the input. They open in MeshLab, Blender and most
+/// viewers. frames.json lists them with their quality measures. preview.png shows them side by side.
 #[derive(Debug, Args)]
 pub(super) struct ExtractArgs {
     /// Folder of the run
     run: PathBuf,
 
-    /// How many surfaces, at even times from 0 to 1
+    /// Number of surfaces, at even times from 0 to 1
     #[arg(long, value_name = "N", default_value_t = 9, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     frames: u32,
 
-    /// The times themselves, 0 to 1, as in 0.25,0.5
+    /// Times from 0 to 1, such as 0.25,0.5, instead of --frames
     #[arg(
         long,
         value_name = "A,B,C",
@@ -29,25 +29,25 @@ pub(super) struct ExtractArgs {
     )]
     times: Vec<f64>,
 
-    /// Cells along the longest side of the box, 8 to 2048 [default: as in the recipe]
+    /// Grid cells along the longest side of the box, 8 to 2048 [default: result.resolution]
     #[arg(long, value_name = "R", value_parser = clap::value_parser!(u32).range(8..=2048))]
     resolution: Option<u32>,
 
-    /// Kind of the files
+    /// File format
     #[arg(long, value_enum, default_value_t = Format::Ply)]
     format: Format,
 
-    /// Also carry the source's own vertices along the velocity field (faces, colours and texture
-    /// coordinates kept)
+    /// Also write the source file with its vertices moved to each time; faces, colours and texture
+    /// coordinates are kept
     #[arg(long)]
     carry: bool,
 
-    /// Leave out pieces with less than this share of a surface's area; 0 keeps every piece [default: as
-    /// in the recipe]
+    /// Drop pieces smaller than this share of the surface area; 0 keeps all
+    /// [default: result.smallest-component]
     #[arg(long, value_name = "SHARE")]
     smallest_component: Option<f64>,
 
-    /// Folder for the files [default: meshes/ in the run]
+    /// Output folder [default: meshes/ in the run]
     #[arg(long, short, value_name = "DIR")]
     output: Option<PathBuf>,
 

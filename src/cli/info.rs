@@ -6,10 +6,10 @@ use clap::Args;
 
 use super::{Result, print};
 
-/// Say what a shape, a sequence (.anime), a recipe (.toml) or a run is
+/// Describe a shape, a sequence (.anime), a recipe (.toml) or a run
 #[derive(Debug, Args)]
 pub(super) struct InfoArgs {
-    /// A file, or the folder of a run
+    /// File, or folder of a run
     path: PathBuf,
 }
 

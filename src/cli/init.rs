@@ -10,21 +10,23 @@ use super::{Failure, Result, print};
 
 /// Print a commented recipe for two shapes
 ///
-/// The shapes are read, so that a mistake shows at once. Save the recipe and give it to
-/// `isomorph train`.
+/// Both shapes are read, so an unreadable file is reported at once. The ten keys that people change stand
+/// first. The other keys of the chosen method follow. Save the recipe as a file and train with
+/// `isomorph train FILE`.
 #[derive(Debug, Args)]
 pub(super) struct InitArgs {
-    /// The shape at time 0: PLY or OBJ, a mesh or a point cloud
+    /// Shape at time 0, a mesh or point cloud as PLY or OBJ
     source: PathBuf,
 
-    /// The shape at time 1
+    /// Shape at time 1
     target: PathBuf,
 
-    /// Known pairs of vertices: a CSV file of source_index,target_index lines, same-vertices, match (found before training), or none
+    /// Corresponding vertices: a CSV file with source_index,target_index on each line, same-vertices, match
+    /// (found before training), or none
     #[arg(long, value_name = "FILE", default_value = "none")]
     correspondences: String,
 
-    /// The values that keys left out fall back to: quick, default, quality or paper
+    /// Values of all other keys: quick, default, quality or paper
     #[arg(long, default_value = "default")]
     preset: String,
 

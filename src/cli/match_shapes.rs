@@ -11,49 +11,51 @@ use serde::Serialize;
 
 use super::{Failure, Result, print};
 
-/// Find which points of two shapes correspond, and write them as pairs
+/// Find pairs of corresponding points of two shapes
 ///
-/// For two poses or states of one thing, as meshes or point clouds, complete or with parts missing.
-/// The pairs can be given to a recipe as data.correspondences; data.correspondences = "match" has
-/// training find them itself. Each pair is checked in both directions; how far points come back
-/// from where they began that are carried to the other shape and back says how much to trust them.
+/// The shapes are two poses or states of one thing, as meshes or point clouds, complete or with missing
+/// parts. Name the file of pairs in a recipe as data.correspondences. With data.correspondences = "match",
+/// training finds the pairs itself. Pairs are checked in both directions. The round-trip error shows how
+/// reliable they are. It is the distance of points from their start after they were moved to the other
+/// shape and back.
 #[derive(Debug, Args)]
 pub(super) struct MatchArgs {
-    /// The shape at time 0: PLY or OBJ, a mesh or a point cloud
+    /// Shape at time 0, a mesh or point cloud as PLY or OBJ
     source: PathBuf,
 
-    /// The shape at time 1
+    /// Shape at time 1
     target: PathBuf,
 
-    /// Where to write source_index,target_index,confidence lines
+    /// Output file with lines of source_index,target_index,confidence
     #[arg(long, short, value_name = "FILE", default_value = "pairs.csv")]
     output: PathBuf,
 
-    /// Keep this many pairs at most, spread evenly over the source [default: all]
+    /// Keep at most this many pairs, spread evenly over the source [default: all]
     #[arg(long, value_name = "N")]
     count: Option<usize>,
 
-    /// Keep pairs of this confidence or more, 0 to 1
+    /// Smallest confidence of a pair that is kept, 0 to 1
     #[arg(long, value_name = "C", default_value_t = MatchOptions::default().least_confidence)]
     confidence: f64,
 
-    /// The shapes are in one frame already: look for no rigid motion between them
+    /// Skip the search for a rigid motion, because the shapes are in the same coordinates already
     #[arg(long)]
     aligned: bool,
 
-    /// Points spread over each mesh, and the most that are taken of a cloud
+    /// Points sampled on each mesh, and the largest number used from a cloud
     #[arg(long, value_name = "N", default_value_t = MatchOptions::default().points)]
     points: usize,
 
-    /// Points that move on their own; more follow finer motion, in time that grows with the square
+    /// Points that move independently; more follow finer motion, and time grows with the square of their
+    /// number
     #[arg(long, value_name = "N", default_value_t = MatchOptions::default().nodes)]
     nodes: usize,
 
-    /// Names the points that are drawn
+    /// Random seed for sampling
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
 
-    /// Also draw how far points come back from where they began, as SVG
+    /// Also draw the distribution of the round-trip error, as SVG
     #[arg(long, value_name = "FILE.svg")]
     picture: Option<PathBuf>,
 

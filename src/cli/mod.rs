@@ -25,7 +25,7 @@ use isomorph::{Backend, ErrorKind, StopFlag};
 
 use terminal::Terminal;
 
-/// Learns a continuous, physically plausible deformation between two 3D shapes.
+/// Computes the motion between two 3D shapes, and every shape in between
 #[derive(Debug, Parser)]
 #[command(
     name = "isomorph",
@@ -57,11 +57,11 @@ enum Command {
 /// Where networks run.
 #[derive(Clone, Debug, Args)]
 struct BackendArgs {
-    /// Where to compute
+    /// Part of burn that does the arithmetic: flex and ndarray run on CPUs, wgpu on GPUs
     #[arg(long, default_value = DEFAULT_BACKEND, value_parser = PossibleValuesParser::new(Backend::NAMES))]
     backend: String,
 
-    /// Device of the backend: default, cpu, discrete[:N], integrated[:N] or virtual[:N]
+    /// Device of the backend wgpu: default, cpu, discrete[:N], integrated[:N] or virtual[:N]
     #[arg(long, value_name = "NAME")]
     device: Option<String>,
 }
@@ -83,7 +83,7 @@ impl BackendArgs {
 /// Changes of the recipe from the command line.
 #[derive(Clone, Debug, Args)]
 struct SetArgs {
-    /// Overrides one key of the recipe; may be given several times
+    /// Override one key of the recipe; may be repeated
     #[arg(long = "set", value_name = "SECTION.KEY=VALUE")]
     overrides: Vec<String>,
 }

@@ -10,17 +10,17 @@ use serde::Serialize;
 
 use super::{Failure, Result, print};
 
-/// Estimate the normals of a point cloud, all pointing out of the shape, and write them with it
+/// Estimate the normals of a point cloud, and write them with its points
 ///
-/// For clouds without normals, or with doubtful ones. Training does the same by itself where a cloud has none
-/// (data.normals = "auto", or "estimate" for any); this shows beforehand what it would learn from. Of a mesh
-/// the vertices are taken as a cloud.
+/// The normals point out of the shape. Training does the same by itself where a cloud has no normals
+/// (data.normals = "auto"), or for any cloud with data.normals = "estimate". Use this command to inspect the
+/// normals before training. The vertices of a mesh are used as a cloud.
 #[derive(Debug, Args)]
 pub(super) struct NormalsArgs {
-    /// The cloud: PLY or OBJ
+    /// Point cloud, PLY or OBJ
     shape: PathBuf,
 
-    /// Where to write the points with their normals: .ply or .obj
+    /// Output file for points and normals, .ply or .obj
     #[arg(long, short, value_name = "FILE")]
     output: PathBuf,
 
@@ -74,14 +74,14 @@ fn text(found: &Estimate, output: &Path) -> String {
     );
     let _ = writeln!(
         text,
-        "outside      clear at {:.1} % of the points, contradicted by the cloud as a whole at {:.1} %",
+        "outside      clear at {:.1} % of the points; the whole cloud contradicts {:.1} %",
         percent(found.clear),
         percent(found.contradicted)
     );
     if let Some(own) = &found.own {
         let _ = writeln!(
             text,
-            "own normals  {:.2} % on the same side, lines {:.1} degrees apart in the median",
+            "own normals  {:.2} % on the same side; median angle between the lines {:.1} degrees",
             percent(own.same_side),
             own.median_angle
         );

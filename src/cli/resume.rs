@@ -7,11 +7,11 @@ use isomorph::Session;
 
 use super::{BackendArgs, QuietArgs, Result, SetArgs, stop_on_interrupt};
 
-/// Go on with a run that was interrupted, or train it for longer
+/// Go on with an interrupted run, or train a finished one for longer
 ///
-/// The run goes on from its newest checkpoint, on any backend, and ends in the same networks as if it
-/// had never stopped. Other keys than those of the networks may be changed with --set, or in the run's
-/// recipe.toml: more steps, for one.
+/// The run goes on from its newest checkpoint, on any backend that has its method. It ends in the same
+/// networks as if it had never stopped. You may change any key except those of the method and of the
+/// networks. Use --set or the run's recipe.toml, for example for more steps.
 #[derive(Debug, Args)]
 pub(super) struct ResumeArgs {
     /// Folder of the run

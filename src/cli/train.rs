@@ -7,21 +7,21 @@ use isomorph::{Recipe, Session, is_run};
 
 use super::{BackendArgs, Failure, QuietArgs, Result, SetArgs, stop_on_interrupt};
 
-/// Train on the two shapes of a recipe, and write a few surfaces in between
+/// Train on the two shapes of a recipe, and write surfaces in between
 ///
-/// The run's folder receives the resolved recipe, metrics, checkpoints, and at the end surfaces as PLY
-/// files (meshes/) with a picture of them (meshes/preview.png). Ctrl-C stops after the present step and
-/// leaves a checkpoint; `isomorph resume` goes on from it.
+/// The run's folder receives the resolved recipe, metrics and checkpoints. At the end it receives surfaces
+/// as PLY files in meshes/, and a picture of them, meshes/preview.png. Ctrl-C finishes the present step and
+/// writes a checkpoint. `isomorph resume` goes on from it.
 #[derive(Debug, Args)]
 pub(super) struct TrainArgs {
-    /// The recipe, a TOML file; `isomorph init` writes one
+    /// The recipe, a TOML file; `isomorph init` prints one
     recipe: PathBuf,
 
-    /// Folder of the run [default: runs/ and the recipe's folder and name, as in runs/fox-quick]
+    /// Folder of the run [default: runs/FOLDER-NAME of the recipe, such as runs/fox-quick]
     #[arg(long, value_name = "DIR")]
     run: Option<PathBuf>,
 
-    /// Replace the run if there is one already
+    /// Replace an existing run
     #[arg(long)]
     force: bool,
 

@@ -35,7 +35,7 @@ pub enum ShapeError {
         extension: String,
     },
     /// A sequence was given where one shape is expected.
-    #[error("{}: is a sequence of frames, not one shape; save the frame wanted as .ply or .obj", .path.display())]
+    #[error("{}: is a sequence of frames, not one shape; save one frame as .ply or .obj", .path.display())]
     NotOneShape {
         /// The file.
         path: PathBuf,

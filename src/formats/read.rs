@@ -16,13 +16,6 @@ use super::{obj, ply};
 /// that is missing, empty, truncated or not of its format, coordinates that are not finite, faces
 /// that refer to vertices that do not exist, a cloud of fewer than [`FEWEST_POINTS`](super::FEWEST_POINTS) points,
 /// vertices all in one place, no area.
-///
-/// # Examples
-/// ```no_run
-/// let fox = isomorph::formats::read("data/fox/source.ply".as_ref())?;
-/// println!("{} vertices, {} triangles", fox.mesh.vertices.len(), fox.mesh.triangles.len());
-/// # Ok::<(), isomorph::formats::ShapeError>(())
-/// ```
 pub fn read(path: &Path) -> Result<Shape, ShapeError> {
     let extension = path
         .extension()

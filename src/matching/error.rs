@@ -23,8 +23,8 @@ pub enum MatchError {
     },
     /// No pair is sure enough.
     #[error(
-        "{} and {}: no pair of vertices has a confidence of {least} or more; are these two poses of one thing? \
-         lower the least confidence (such as 0.1), or give pairs by hand",
+        "{} and {}: no pair of vertices has a confidence of {least} or more; check that both show the same \
+         thing, lower the least confidence (such as 0.1), or give pairs by hand",
         .source_path.display(), .target_path.display()
     )]
     NoPairs {

@@ -84,7 +84,9 @@ pub enum CheckpointError {
         reason: io::Error,
     },
     /// There is none to start from.
-    #[error("{0}: no checkpoint here: the run has not come that far, or was moved without them")]
+    #[error(
+        "{0}: no checkpoint here: the run stopped before its first one, or was moved without them; train again"
+    )]
     None(PathBuf),
     /// A file is not what was written.
     #[error(
@@ -98,7 +100,7 @@ pub enum CheckpointError {
     },
     /// Written by a later isomorph.
     #[error(
-        "{path}: format version {found}, this isomorph reads {FORMAT_VERSION}: update isomorph"
+        "{path}: format version {found}, and this isomorph reads {FORMAT_VERSION} at most; update isomorph"
     )]
     Version {
         /// The file.

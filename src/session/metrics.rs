@@ -63,7 +63,7 @@ pub enum MetricsError {
     },
     /// A line is something else.
     #[error(
-        "{path}:{line}: not the metrics of a step ({reason}); delete the line, nothing else needs it"
+        "{path}:{line}: not the metrics of a step ({reason}); delete the line; nothing else needs it"
     )]
     Line {
         /// The file.

@@ -267,8 +267,8 @@ pub(crate) fn points_of(
             && is_inside_out(&shape.mesh.vertices, normals)
         {
             notes.push(format!(
-                "{name}: the file's normals point inwards on the whole: taken as they are; if the shape is \
-                 closed, set data.normals = \"estimate\" or turn them"
+                "{name}: the file's normals point inwards on the whole, and are used as they are; if the \
+                 shape is closed, set data.normals = \"estimate\" or flip them"
             ));
         }
         (shape.mesh.vertices.clone(), normals.ok())
@@ -321,7 +321,7 @@ fn outward(
         } = sharing;
         notes.push(format!(
             "{name}: the mesh is not closed ({open} open edges, {branching} of more than two \
-             triangles): its normals are taken as its triangles are wound"
+             triangles): its normals follow the winding of its triangles"
         ));
     } else if shape.mesh.volume() < 0.0 {
         notes.push(format!(

@@ -45,7 +45,7 @@ pub enum DeviceError {
 /// The method of a recipe does not run on this backend.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "method.name = \"{method}\": runs on the backend flex only, as all methods that isomorph is compared with"
+    "method.name = \"{method}\": runs on the backend flex only, like all methods that isomorph is compared with; use that backend"
 )]
 pub struct NotHere {
     /// Its name.

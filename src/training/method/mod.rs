@@ -175,7 +175,7 @@ pub fn check(recipe: &Recipe, data: &TrainingData) -> Result<(), String> {
     }
     if needs.correspondences && data.pair_count() == 0 {
         return Err(format!(
-            "method.name = \"{name}\": it {}, and none are known; name a file of pairs in \
+            "method.name = \"{name}\": it {}, and there are none; name a file of pairs in \
              data.correspondences, or choose another method",
             spec::ON_CORRESPONDENCES
         ));

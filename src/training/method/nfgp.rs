@@ -74,7 +74,7 @@ section! {
         deformations: usize = 8 | 8 | 8 | 8, Rule::whole(1, 1000);
         /// Residual blocks of a deformation.
         blocks: usize = 6 | 6 | 6 | 6, Rule::whole(1, 32);
-        /// Weight of the distance between the correspondences and their places at that time.
+        /// Weight of the distance of the known points (handles) from their targets at that time.
         handles: f64 = 100 | 100 | 100 | 100, Rule::positive_or_zero().zero("turns it off");
         /// Weight of the change of lengths on the surface.
         stretch: f64 = 0.1 | 0.1 | 0.1 | 0.1, Rule::positive_or_zero().zero("turns it off");

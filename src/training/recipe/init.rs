@@ -19,14 +19,14 @@ const FIRST: [(&str, &str); 10] = [
     (
         "preset",
         "Quality against time. Every key that is left out has the preset's value. On two cores \
-         \"quick\" takes minutes, \"default\" about eleven times as long, \"quality\" longer still. \
-         \"paper\" is the method as the paper prints it.",
+         \"quick\" takes about one minute, \"default\" about ten minutes, \"quality\" about an hour. \
+         \"paper\" is the method as the paper prints it, and takes hours.",
     ),
     (
         "data.correspondences",
         "Known pairs of points. A few decide where parts go, above all in large motions. \"none\": no \
          pairs. \"same-vertices\": vertices of equal number are pairs. \"match\": isomorph finds \
-         pairs before training, which takes some minutes. A path: a CSV file with \
+         pairs before training, which takes about a minute. A path: a CSV file with \
          source_index,target_index on each line.",
     ),
     (
