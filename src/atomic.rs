@@ -8,7 +8,7 @@ use std::path::Path;
 const TEMPORARY: &str = ".isomorph-";
 
 /// Whether a file of this name is what a killed [`write_atomically`] left behind.
-pub fn is_left_over(name: &std::ffi::OsStr) -> bool {
+pub(crate) fn is_left_over(name: &std::ffi::OsStr) -> bool {
     name.to_string_lossy().starts_with(TEMPORARY)
 }
 
@@ -18,7 +18,7 @@ pub fn is_left_over(name: &std::ffi::OsStr) -> bool {
 ///
 /// # Errors
 /// What `write` returns, or what the file system says; the message names `path`.
-pub fn write_atomically(
+pub(crate) fn write_atomically(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> io::Result<()> {

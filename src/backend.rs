@@ -144,7 +144,13 @@ mod tests {
         let text = "gpu".parse::<Backend>().expect_err("none").to_string();
         assert_eq!(text, "backend gpu: must be one of ndarray, flex, wgpu");
         assert_eq!(Backend::Flex.on("cpu").expect("its own"), Backend::Flex);
-        let text = Backend::Flex.on("discrete:1").expect_err("a GPU").to_string();
-        assert!(text.contains("discrete:1") && text.contains("wgpu"), "{text}");
+        let text = Backend::Flex
+            .on("discrete:1")
+            .expect_err("a GPU")
+            .to_string();
+        assert!(
+            text.contains("discrete:1") && text.contains("wgpu"),
+            "{text}"
+        );
     }
 }

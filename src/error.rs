@@ -186,10 +186,16 @@ mod tests {
     fn the_kind_decides_the_exit_status_and_a_part_of_the_work_is_named_once() {
         let error = Error::usage("t = 2: must be 0 to 1").within("method quick");
         assert_eq!(error.to_string(), "method quick: t = 2: must be 0 to 1");
-        assert_eq!((error.kind(), error.kind().exit_status()), (ErrorKind::Usage, 2));
+        assert_eq!(
+            (error.kind(), error.kind().exit_status()),
+            (ErrorKind::Usage, 2)
+        );
         let stopped = Error::interruption("stopped").kind().exit_status();
         assert_eq!(stopped, 130);
         let refused: Error = io::Error::other("disk full").into();
-        assert_eq!((refused.kind(), refused.kind().exit_status()), (ErrorKind::Failure, 1));
+        assert_eq!(
+            (refused.kind(), refused.kind().exit_status()),
+            (ErrorKind::Failure, 1)
+        );
     }
 }

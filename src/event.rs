@@ -149,10 +149,14 @@ impl Event {
     }
 }
 
-/// The event's line, or nothing.
+/// The event's line; of what needs none, how far the work has come.
 impl fmt::Display for Event {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.write_str(&self.line(None).unwrap_or_default())
+        match self {
+            Self::Tick { step } => write!(formatter, "step {step}"),
+            Self::Measuring { done, total } => write!(formatter, "measured {done} of {total}"),
+            _ => formatter.write_str(&self.line(None).unwrap_or_default()),
+        }
     }
 }
 

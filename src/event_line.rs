@@ -100,13 +100,11 @@ fn started(event: &Event) -> Option<String> {
         .iter()
         .map(|(name, weights)| format!("{name} has {}", counted(*weights, "weight")))
         .collect();
-    let (first, others) = points.split_first()?;
-    let others = others.iter().map(|count| format!(", {}", grouped(*count)));
+    let points: Vec<String> = points.iter().map(|count| grouped(*count)).collect();
     Some(format!(
-        "{begun} {backend} ({device}): {}; {}{} on the key frames, {}",
+        "{begun} {backend} ({device}): {}; key frames of {} points, {}",
         networks.join(", "),
-        counted(*first, "point"),
-        others.collect::<String>(),
+        points.join(" and "),
         counted(*correspondences, "correspondence"),
     ))
 }

@@ -1,7 +1,7 @@
 //! How each event reads.
 
 use super::*;
-use crate::learner::event::Phase;
+use crate::event::Phase;
 
 fn report(terms: &[(&'static str, f64)]) -> StepReport {
     let terms: Vec<TermReport> = terms
@@ -26,7 +26,7 @@ fn report(terms: &[(&'static str, f64)]) -> StepReport {
 }
 
 fn text(event: Event) -> String {
-    line(&event, Path::new("runs/fox"), None).expect("a line")
+    line(&event, None).expect("a line")
 }
 
 #[test]
@@ -40,7 +40,7 @@ fn a_step_names_its_largest_terms_and_sums_the_others() {
     let report = report(&[&terms[..], &[("level-set", 0.11)]].concat());
     let left = Some(Duration::from_secs(870));
     assert_eq!(
-        line(&Event::Step(report), Path::new(""), left).expect("a line"),
+        line(&Event::Step(report), left).expect("a line"),
         "step 500 of 4000, ramp, 2m05s, 14m30s left, peak 312 MiB: total 1.23 \
          (matching 0.810, eikonal 0.204, level-set 0.110, 2 more 0.106)"
     );
@@ -69,14 +69,13 @@ fn the_start_says_what_is_trained_on_what() {
         steps: 4000,
         first_step,
         networks: vec![("f", 66_433), ("V", 28_035)],
-        source_points: 20_000,
-        target_points: 20_000,
+        points: vec![20_000, 18_000],
         correspondences: 1,
     };
     assert_eq!(
         text(started(0)),
-        "4,000 steps on ndarray (Cpu): f has 66,433 weights, V has 28,035 weights; 20,000 points \
-         on the source, 20,000 on the target, 1 correspondence"
+        "4,000 steps on ndarray (Cpu): f has 66,433 weights, V has 28,035 weights; key frames of \
+         20,000 and 18,000 points, 1 correspondence"
     );
     assert!(text(started(500)).starts_with("going on after step 500 of 4000 on ndarray (Cpu): f"));
 }
@@ -109,7 +108,7 @@ fn an_extraction_says_what_is_wrong_with_the_surface() {
 
 #[test]
 fn the_other_events_read_like_this() {
-    assert_eq!(line(&Event::Tick { step: 3 }, Path::new(""), None), None);
+    assert_eq!(line(&Event::Tick { step: 3 }, None), None);
     assert_eq!(text(Event::Note("two\nlines".into())), "note: two lines");
     let matched = Event::Matched {
         pairs: 3812,
@@ -138,7 +137,7 @@ fn the_other_events_read_like_this() {
     );
     assert_eq!(
         text(Event::Interrupted { step: 812 }),
-        "interrupted after step 812; go on with `isomorph resume runs/fox`"
+        "interrupted after step 812: the newest checkpoint holds all of it"
     );
     let finished = Event::Finished {
         step: 4000,

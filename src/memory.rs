@@ -11,7 +11,7 @@
 ///
 /// Memory of a graphics card is not part of it.
 #[cfg(target_os = "linux")]
-pub fn peak_memory_bytes() -> Option<u64> {
+pub(crate) fn peak_memory_bytes() -> Option<u64> {
     high_water_mark(&std::fs::read_to_string("/proc/self/status").ok()?)
 }
 

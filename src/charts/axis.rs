@@ -6,7 +6,7 @@ use std::ops::Range;
 
 /// How values are laid out along an axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Scale {
+pub(crate) enum Scale {
     /// Equal differences, equal distances.
     #[default]
     Linear,

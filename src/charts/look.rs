@@ -12,7 +12,7 @@ const ROUNDS: [&str; 4] = ["none", "16 3", "10 3 3 3", "5 2"];
 
 /// How a line is drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Stroke {
+pub(crate) enum Stroke {
     /// Solid, in the next colour of the palette: a method.
     #[default]
     Solid,

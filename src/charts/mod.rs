@@ -12,8 +12,8 @@ mod axis;
 mod look;
 mod svg;
 
-pub use axis::Scale;
-pub use look::Stroke;
+pub(crate) use axis::Scale;
+pub(crate) use look::Stroke;
 
 use axis::Axis;
 use look::Look;
@@ -52,7 +52,7 @@ pub enum ChartError {
 /// One pair of axes and the lines in it. Panels of one chart with the same `y_label` and `y_scale` have
 /// the same range of y, so that heights compare.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Panel {
+pub(crate) struct Panel {
     /// What stands above it.
     pub title: String,
     /// Quantity and unit of x.
@@ -69,7 +69,7 @@ pub struct Panel {
 
 /// A line through points in the order given.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Line {
+pub(crate) struct Line {
     /// Its name in the legend; the same in every panel.
     pub label: String,
     /// How it is drawn.
@@ -83,7 +83,7 @@ pub struct Line {
 ///
 /// # Errors
 /// [`ChartError`].
-pub fn line_chart(title: &str, panels: &[Panel]) -> Result<String, ChartError> {
+pub(crate) fn line_chart(title: &str, panels: &[Panel]) -> Result<String, ChartError> {
     if panels.is_empty() {
         return Err(ChartError::NoPanels);
     }

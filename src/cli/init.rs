@@ -52,6 +52,12 @@ pub(super) fn run(args: InitArgs) -> Result {
         "match" => Correspondences::Match,
         file => Correspondences::File(PathBuf::from(file)),
     };
-    let text = Recipe::commented(&args.source, &args.target, &correspondences, preset, args.all);
+    let text = Recipe::commented(
+        &args.source,
+        &args.target,
+        &correspondences,
+        preset,
+        args.all,
+    );
     print(&text.map_err(isomorph::Error::from)?)
 }

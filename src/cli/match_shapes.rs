@@ -71,7 +71,9 @@ pub(super) fn run(args: MatchArgs) -> Result {
             .is_none_or(|extension| !extension.eq_ignore_ascii_case("svg"))
     {
         let path = path.display();
-        return Err(Failure::Usage(format!("--picture {path}: must end in .svg")));
+        return Err(Failure::Usage(format!(
+            "--picture {path}: must end in .svg"
+        )));
     }
     let options = MatchOptions {
         points: args.points,

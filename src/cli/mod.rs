@@ -4,6 +4,12 @@
 //! Results go to standard output, all else to standard error. Exit status: 0 done, 1 failed, 2 usage or
 //! a bad recipe, 130 interrupted with a checkpoint written.
 
+#![allow(
+    clippy::print_stderr,
+    clippy::exit,
+    reason = "what talks to people and ends the process is here"
+)]
+
 mod bench;
 mod compare;
 mod evaluate;
@@ -35,7 +41,7 @@ use terminal::Terminal;
         isomorph init a.ply b.ply > pair.toml    write a recipe for two shapes of your own\n  \
         isomorph extract runs/fox-quick --frames 25 --carry"
 )]
-pub struct Cli {
+pub(crate) struct Cli {
     #[command(subcommand)]
     command: Command,
 }
@@ -150,7 +156,7 @@ impl Failure {
 }
 
 /// Runs the command and says how it went.
-pub fn run(cli: Cli) -> ExitCode {
+pub(crate) fn run(cli: Cli) -> ExitCode {
     let ended = match cli.command {
         Command::Train(args) => train::run(args),
         Command::Resume(args) => resume::run(args),

@@ -37,7 +37,9 @@ pub(super) fn run(args: NormalsArgs) -> Result {
     };
     if !is("ply") && !is("obj") {
         let output = output.display();
-        return Err(Failure::Usage(format!("--output {output}: must end in .ply or .obj")));
+        return Err(Failure::Usage(format!(
+            "--output {output}: must end in .ply or .obj"
+        )));
     }
     let found = estimate(&Shape::read(&args.shape)?);
     found.write(output)?;

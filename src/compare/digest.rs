@@ -40,7 +40,7 @@ pub enum DigestError {
 
 /// All that decides a result.
 #[derive(Clone, Copy, Debug)]
-pub struct Inputs<'a> {
+pub(crate) struct Inputs<'a> {
     /// The resolved recipe, TOML. A path in its `[data]` counts by the contents of the file; where
     /// there is no such file, by its name without the folder.
     pub recipe: &'a str,
@@ -57,7 +57,7 @@ impl Inputs<'_> {
     ///
     /// # Errors
     /// [`DigestError`].
-    pub fn digest(&self) -> Result<String, DigestError> {
+    pub(crate) fn digest(&self) -> Result<String, DigestError> {
         let mut pieces = BTreeMap::new();
         for (section, value) in self.recipe.parse::<Table>()? {
             if !IRRELEVANT.contains(&section.as_str()) {

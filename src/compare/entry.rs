@@ -102,7 +102,7 @@ fn model(cpuinfo: &str) -> Option<String> {
 
 /// The time, RFC 3339 in UTC, to the second.
 #[must_use]
-pub fn now() -> String {
+pub(crate) fn now() -> String {
     humantime::format_rfc3339_seconds(SystemTime::now()).to_string()
 }
 

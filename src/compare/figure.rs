@@ -16,7 +16,7 @@ const Y_LABEL: &str = "CD ×10³ (normalised units²)";
 /// # Errors
 /// [`ChartError::Empty`] if a pair that is done has no frame to show, [`ChartError::NoPanels`] if none
 /// is done.
-pub fn error_figure(plan: &Plan, entries: &[Entry]) -> Result<String, ChartError> {
+pub(crate) fn error_figure(plan: &Plan, entries: &[Entry]) -> Result<String, ChartError> {
     let panels: Vec<Panel> = plan
         .pairs
         .iter()

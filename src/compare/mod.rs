@@ -31,19 +31,20 @@ use crate::atomic::write_atomically;
 use crate::charts::ChartError;
 
 pub use comparison::Comparison;
-pub use digest::{DigestError, Inputs};
-pub use entry::{Entry, Machine, Network, Run, command_line, now};
-pub use figure::error_figure;
-pub use plan::{FramePair, MethodPlan, Plan, PlanError, Request, sequence_name};
-pub use store::{Lookup, Store, StoreError, file_stem};
+pub(crate) use digest::{DigestError, Inputs};
+pub use entry::command_line;
+pub(crate) use entry::{Entry, Machine, Network, Run, now};
+pub(crate) use figure::error_figure;
+pub(crate) use plan::{FramePair, MethodPlan, Plan, PlanError, Request, sequence_name};
+pub(crate) use store::{Lookup, Store, StoreError, file_stem};
 pub use table::table;
 
 /// File of the table in a sequence's folder.
-pub const TABLE: &str = "table.md";
+pub(crate) const TABLE: &str = "table.md";
 /// File of the comparison in a sequence's folder.
-pub const COMPARISON: &str = "comparison.json";
+pub(crate) const COMPARISON: &str = "comparison.json";
 /// File of the figure in a sequence's folder.
-pub const FIGURE: &str = "error.svg";
+pub(crate) const FIGURE: &str = "error.svg";
 
 /// Why the results could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -61,7 +62,7 @@ pub enum ReportError {
 ///
 /// # Errors
 /// [`ReportError`].
-pub fn write_report(
+pub(crate) fn write_report(
     store: &Store,
     plan: &Plan,
     entries: &[Entry],

@@ -172,7 +172,7 @@ impl Plan {
 
 /// The name of a sequence: its file without ending, or its folder.
 #[must_use]
-pub fn sequence_name(path: &Path) -> String {
+pub(crate) fn sequence_name(path: &Path) -> String {
     // "..", "." and "sequences/" have no name of their own until they are resolved.
     let resolved = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
     let name = if resolved.is_dir() {

@@ -48,7 +48,7 @@ pub enum StoreError {
 
 /// What the store knows of a pair and a method.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Lookup {
+pub(crate) enum Lookup {
     /// It is done.
     Done(Box<Entry>),
     /// There is nothing of it.
@@ -62,7 +62,7 @@ pub enum Lookup {
 
 /// The results of one sequence.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Store {
+pub(crate) struct Store {
     folder: PathBuf,
     sequence: String,
 }
@@ -86,7 +86,7 @@ struct Versions {
 impl Store {
     /// The results of a sequence under the folder `results`, which need not be there yet.
     #[must_use]
-    pub fn at(results: &Path, sequence: &str) -> Self {
+    pub(crate) fn at(results: &Path, sequence: &str) -> Self {
         Self {
             folder: results.join(file_stem(sequence)),
             sequence: sequence.to_owned(),
@@ -97,7 +97,7 @@ impl Store {
     ///
     /// # Errors
     /// [`StoreError::Io`].
-    pub fn create(&self) -> Result<(), StoreError> {
+    pub(crate) fn create(&self) -> Result<(), StoreError> {
         fs::create_dir_all(&self.folder).map_err(|error| {
             io::Error::new(error.kind(), format!("{}: {error}", self.folder.display()))
         })?;
@@ -109,7 +109,7 @@ impl Store {
     /// # Errors
     /// [`StoreError::Io`] if the folder cannot be made.
     #[cfg(test)]
-    pub fn open(results: &Path, sequence: &str) -> Result<Self, StoreError> {
+    pub(crate) fn open(results: &Path, sequence: &str) -> Result<Self, StoreError> {
         let store = Self::at(results, sequence);
         store.create()?;
         Ok(store)
@@ -117,14 +117,14 @@ impl Store {
 
     /// The folder of the sequence.
     #[must_use]
-    pub fn folder(&self) -> &Path {
+    pub(crate) fn folder(&self) -> &Path {
         &self.folder
     }
 
     /// Looks for the result of a method on a pair, made from the same inputs: see
     /// [`super::Inputs::digest`].
     #[must_use]
-    pub fn find(&self, pair: FramePair, label: &str, digest: &str) -> Lookup {
+    pub(crate) fn find(&self, pair: FramePair, label: &str, digest: &str) -> Lookup {
         let path = self.folder.join(file_name(pair, label));
         let text = match fs::read(&path) {
             Ok(text) => text,
@@ -141,7 +141,7 @@ impl Store {
     ///
     /// # Errors
     /// [`StoreError`]; an earlier result then stays as it was.
-    pub fn record(&self, entry: &Entry) -> Result<(), StoreError> {
+    pub(crate) fn record(&self, entry: &Entry) -> Result<(), StoreError> {
         let path = self.folder.join(file_name(entry.pair, &entry.run.method));
         let stored = Stored {
             format: FORMAT,
@@ -218,7 +218,7 @@ pub(super) fn file_name(pair: FramePair, label: &str) -> String {
 
 /// A name that every file system takes: ASCII letters, digits, `-`, `_` and dots inside. What had to
 /// be changed for it gets a checksum of the text, so that "a/b" and "a b" stay two.
-pub fn file_stem(text: &str) -> String {
+pub(crate) fn file_stem(text: &str) -> String {
     let is_plain = |letter: char| letter.is_ascii_alphanumeric() || "-_.".contains(letter);
     let stem: String = text
         .chars()

@@ -25,12 +25,14 @@ use crate::geometry::Mesh;
 
 /// What [`extract`] found.
 #[derive(Clone, Debug)]
-pub struct Extraction {
+pub(crate) struct Extraction {
     /// The surface, without normals.
     pub mesh: Mesh<f32>,
     /// How many points the field was evaluated at.
+    #[cfg(test)]
     pub evaluated: usize,
     /// How many nodes the whole grid has.
+    #[cfg(test)]
     pub grid_points: usize,
     /// Whether the surface, or the inside of the shape, reaches the box: the mesh may be open
     /// there.
@@ -44,7 +46,7 @@ pub struct Extraction {
 ///
 /// # Errors
 /// What `field` returns; a wrong number of values; a value that is not finite; no surface.
-pub fn extract<E: std::error::Error>(
+pub(crate) fn extract<E: std::error::Error>(
     field: impl FnMut(&[[f32; 3]]) -> Result<Vec<f32>, E>,
     grid: &Grid,
 ) -> Result<Extraction, ExtractError<E>> {
@@ -57,7 +59,9 @@ pub fn extract<E: std::error::Error>(
     }
     Ok(Extraction {
         mesh,
+        #[cfg(test)]
         evaluated: search.evaluated,
+        #[cfg(test)]
         grid_points: grid.points(),
         touches_box: crosses_box || search.inside_at_box(),
     })

@@ -7,7 +7,7 @@ const LEAST_SPACING: f64 = 64.0 * f32::EPSILON as f64;
 
 /// A box cut into cubic cells.
 #[derive(Clone, Debug)]
-pub struct Grid {
+pub(crate) struct Grid {
     min: [f64; 3],
     /// Side of a cell.
     spacing: f64,
@@ -59,7 +59,7 @@ impl Grid {
     /// # Errors
     /// A resolution out of range, a box without extent, or one so far from the origin that f32
     /// coordinates cannot tell its cells apart.
-    pub fn new(min: [f32; 3], max: [f32; 3], resolution: usize) -> Result<Self, GridError> {
+    pub(crate) fn new(min: [f32; 3], max: [f32; 3], resolution: usize) -> Result<Self, GridError> {
         if !RESOLUTIONS.contains(&resolution) {
             return Err(GridError::Resolution(resolution));
         }
@@ -88,19 +88,20 @@ impl Grid {
 
     /// Side of a cell, in the units of the box.
     #[must_use]
-    pub fn spacing(&self) -> f64 {
+    pub(crate) fn spacing(&self) -> f64 {
         self.spacing
     }
 
     /// Cells along each axis.
     #[must_use]
-    pub fn cells(&self) -> [u32; 3] {
+    pub(crate) fn cells(&self) -> [u32; 3] {
         self.cells
     }
 
     /// How many nodes the grid has.
     #[must_use]
-    pub fn points(&self) -> usize {
+    #[cfg(test)]
+    pub(crate) fn points(&self) -> usize {
         self.cells.iter().map(|&cells| cells as usize + 1).product()
     }
 

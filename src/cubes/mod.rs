@@ -18,5 +18,5 @@ mod lattice;
 mod polygonise;
 mod search;
 
-pub use extract::{Extraction, extract};
-pub use grid::{ExtractError, Grid, GridError};
+pub(crate) use extract::{Extraction, extract};
+pub(crate) use grid::{ExtractError, Grid, GridError};

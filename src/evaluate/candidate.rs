@@ -5,11 +5,11 @@ use std::fmt::{Debug, Display};
 use crate::geometry::Mesh;
 
 /// Positions of the same vertices at several times: one list per time, all of the same length.
-pub type Carried = Vec<Vec<[f32; 3]>>;
+pub(crate) type Carried = Vec<Vec<[f32; 3]>>;
 
 /// What a surface is asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Purpose {
+pub(crate) enum Purpose {
     /// To find the best times, up to 129 of them: a coarser surface will do, a quick one is better.
     Aligning,
     /// To be measured: as fine as the method's own output.
@@ -17,7 +17,7 @@ pub enum Purpose {
 }
 
 /// A method that says where the shape is at any time from 0 to 1, in normalised coordinates.
-pub trait Candidate {
+pub(crate) trait Candidate {
     /// Why it could not answer.
     type Error: Debug + Display;
 

@@ -114,7 +114,7 @@ pub enum TruthError {
 /// Why a method could not be measured; `E` is the method's own error.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum EvaluateError<E: Debug + Display> {
+pub(crate) enum EvaluateError<E: Debug + Display> {
     /// The method could not give what a frame is compared with.
     #[error("frame {frame}, time {time:.4}: {reason}")]
     Candidate {

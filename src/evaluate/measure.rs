@@ -33,7 +33,7 @@ impl Reference {
     /// [`EvaluateError::Candidate`] and [`EvaluateError::Carrying`] if the method could not answer,
     /// [`EvaluateError::Count`] and [`EvaluateError::Area`] if its answer cannot be compared,
     /// [`EvaluateError::Stopped`] if `progress` broke.
-    pub fn evaluate<C: Candidate>(
+    pub(crate) fn evaluate<C: Candidate>(
         &self,
         candidate: &mut C,
         mut progress: impl FnMut(usize, usize) -> ControlFlow<()>,
@@ -137,7 +137,7 @@ impl Reference {
                 continue;
             }
             let nearest = self.nearest_frame(time);
-            let Some(mesh) = self.surface(candidate, nearest, time, Purpose::Aligning)? else {
+            let Some(mesh) = surface(candidate, nearest, time, Purpose::Aligning)? else {
                 continue;
             };
             // The same stream at every time: what sampling adds to the costs is then much the same,
@@ -171,18 +171,6 @@ impl Reference {
         nearest.expect("a span has frames between its ends")
     }
 
-    /// The method's surface; its errors with frame and time.
-    fn surface<C: Candidate>(
-        &self,
-        candidate: &mut C,
-        frame: &TrueFrame,
-        time: f64,
-        purpose: Purpose,
-    ) -> Measured<C, Option<Mesh<f64>>> {
-        let failed = |reason| candidate_error(frame, time, reason);
-        candidate.surface(time, purpose).map_err(failed)
-    }
-
     fn measure_surface<C: Candidate>(
         &self,
         candidate: &mut C,
@@ -192,7 +180,7 @@ impl Reference {
     ) -> Measured<C, Option<Compared>> {
         let near = self.points_near(frame, truth);
         let mut at = |time: f64| -> Measured<C, Option<Metrics>> {
-            let Some(mesh) = self.surface(candidate, frame, time, Purpose::Measured)? else {
+            let Some(mesh) = surface(candidate, frame, time, Purpose::Measured)? else {
                 return Ok(None);
             };
             let surface = self
@@ -243,6 +231,17 @@ impl Reference {
             area,
         })
     }
+}
+
+/// The method's surface; its errors with frame and time.
+fn surface<C: Candidate>(
+    candidate: &mut C,
+    frame: &TrueFrame,
+    time: f64,
+    purpose: Purpose,
+) -> Measured<C, Option<Mesh<f64>>> {
+    let failed = |reason| candidate_error(frame, time, reason);
+    candidate.surface(time, purpose).map_err(failed)
 }
 
 fn candidate_error<E: std::fmt::Debug + std::fmt::Display>(

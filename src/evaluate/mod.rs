@@ -38,8 +38,9 @@ mod tests;
 mod truth;
 mod vertex_path;
 
-pub use candidate::{Candidate, Carried, Purpose};
-pub use error::{EvaluateError, TruthError};
+pub(crate) use candidate::{Candidate, Carried, Purpose};
+pub(crate) use error::{EvaluateError, TruthError};
 pub use evaluation::{Compared, Evaluation, FrameResult, Metrics};
-pub use reference::{Options, Reference};
-pub use truth::{GroundTruth, Span};
+pub(crate) use reference::{Options, Reference};
+pub use truth::GroundTruth;
+pub(crate) use truth::Span;

@@ -14,7 +14,7 @@ const FEWEST_TIMES: usize = 9;
 
 /// How closely to look.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Options {
+pub(crate) struct Options {
     /// Area-uniform samples per surface.
     pub samples: usize,
     /// Evenly spaced times that the aligned ones are chosen from.
@@ -80,7 +80,7 @@ pub(super) struct TrueFrame {
 
 /// A ground truth ready for any number of methods to be measured against.
 #[derive(Debug)]
-pub struct Reference {
+pub(crate) struct Reference {
     pub(super) options: Options,
     pub(super) from: usize,
     /// The vertices at time 0, normalised.
@@ -106,7 +106,7 @@ impl Reference {
     ///
     /// # Panics
     /// If the span is of another, longer sequence.
-    pub fn new(
+    pub(crate) fn new(
         truth: &GroundTruth,
         span: Span,
         normalisation: &Normalisation,
@@ -148,7 +148,7 @@ impl Reference {
 
     /// The frames that are evaluated.
     #[cfg(test)]
-    pub fn frames(&self) -> impl ExactSizeIterator<Item = usize> {
+    pub(crate) fn frames(&self) -> impl ExactSizeIterator<Item = usize> {
         self.frames.iter().map(|frame| frame.frame)
     }
 
@@ -181,7 +181,7 @@ impl Reference {
             let again = self.true_surface(frame, Use::Floor)?;
             Ok((linear, compare(&again, &truth, frame.time)))
         };
-        measure().map_err(|_| frame.frame)
+        measure().map_err(|_no_area| frame.frame)
     }
 
     /// The true vertices of each frame.

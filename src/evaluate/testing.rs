@@ -6,7 +6,7 @@ use crate::geometry::Mesh;
 use crate::geometry::linear::length;
 
 /// A unit square in the plane z = `height`.
-pub fn square(height: f64) -> Mesh<f64> {
+pub(super) fn square(height: f64) -> Mesh<f64> {
     let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
     Mesh::new(
         corners.map(|[x, y]| [x, y, height]).to_vec(),
@@ -16,7 +16,7 @@ pub fn square(height: f64) -> Mesh<f64> {
 
 /// The unit sphere about the origin: an octahedron whose triangles are split in four `splits`
 /// times.
-pub fn sphere(splits: usize) -> Mesh<f64> {
+pub(super) fn sphere(splits: usize) -> Mesh<f64> {
     let mut vertices: Vec<[f64; 3]> = Vec::new();
     for axis in 0..3 {
         for sign in [1.0, -1.0] {

@@ -15,7 +15,7 @@ const HEADER: usize = 12;
 
 /// Frames of one mesh, vertex by vertex.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Sequence {
+pub(crate) struct Sequence {
     /// Where it was read from.
     pub path: PathBuf,
     /// The vertices of each frame, all in the same order.
@@ -31,7 +31,7 @@ impl Sequence {
     /// One line: the file cannot be read, its length is not what its counts claim (checked before
     /// anything is allocated), a coordinate is not finite, a triangle refers to a vertex that does
     /// not exist.
-    pub fn read(path: &Path) -> Result<Self, ShapeError> {
+    pub(crate) fn read(path: &Path) -> Result<Self, ShapeError> {
         let length = file_length(path)?;
         let malformed = |problem: String| ShapeError::malformed(path, problem);
         let unreadable = |reason| ShapeError::Unreadable {
@@ -76,7 +76,7 @@ impl Sequence {
     /// # Errors
     /// [`ShapeError::Frame`] if there is no such frame, and what [`super::read`] refuses in any
     /// shape.
-    pub fn shape(&self, frame: usize) -> Result<Shape, ShapeError> {
+    pub(crate) fn shape(&self, frame: usize) -> Result<Shape, ShapeError> {
         let Some(vertices) = self.frames.get(frame) else {
             let last = self.frames.len() - 1;
             return Err(ShapeError::Frame {
@@ -173,7 +173,7 @@ pub(super) mod tests {
     use crate::geometry::testing::tetrahedron;
 
     /// A tetrahedron in two frames, the second moved by (0, 0, 0.5).
-    pub fn two_frames() -> Vec<u8> {
+    pub(crate) fn two_frames() -> Vec<u8> {
         let Mesh {
             vertices,
             triangles,
@@ -200,7 +200,7 @@ pub(super) mod tests {
         bytes
     }
 
-    pub fn read_bytes(bytes: &[u8]) -> Result<Sequence, ShapeError> {
+    pub(crate) fn read_bytes(bytes: &[u8]) -> Result<Sequence, ShapeError> {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = folder.path().join("move.anime");
         std::fs::write(&path, bytes).expect("written");

@@ -78,7 +78,7 @@ pub enum CarryError {
 /// One line: an original that cannot be read, a number of positions that is not that of its
 /// vertices, positions that are not finite, a name that ends in another extension, a disk that
 /// cannot be written. On any error `out` is as it was before.
-pub fn rewrite_vertices(
+pub(crate) fn rewrite_vertices(
     original: &Path,
     positions: &[[f64; 3]],
     out: &Path,

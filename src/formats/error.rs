@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 /// The least number of points that a cloud, or a sample of a mesh, may have: fewer say too little
 /// about a surface, and leave nothing to estimate normals and areas from.
-pub const FEWEST_POINTS: usize = 64;
+pub(crate) const FEWEST_POINTS: usize = 64;
 
 /// Why shapes could not be read or made into a pair. Vertices, faces and frames count from 0.
 #[derive(Debug, thiserror::Error)]

@@ -9,7 +9,7 @@ use super::{Sequence, Shape, ShapeError};
 
 /// What can happen to a file.
 #[derive(Debug, Clone)]
-pub enum Damage {
+pub(crate) enum Damage {
     Cut(prop::sample::Index),
     Byte(prop::sample::Index, u8),
     Insert(prop::sample::Index, Vec<u8>),
@@ -49,7 +49,7 @@ impl Damage {
     }
 }
 
-pub fn damage() -> impl Strategy<Value = Vec<Damage>> {
+pub(crate) fn damage() -> impl Strategy<Value = Vec<Damage>> {
     let index = any::<prop::sample::Index>;
     let number = prop::sample::select(vec![
         "-1",
@@ -80,7 +80,7 @@ pub fn damage() -> impl Strategy<Value = Vec<Damage>> {
 }
 
 /// Damages a file of this name, reads it, and hands back what came of it with the file's length.
-pub fn read_damaged<T>(
+pub(crate) fn read_damaged<T>(
     name: &str,
     mut bytes: Vec<u8>,
     damage: &[Damage],

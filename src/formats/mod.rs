@@ -20,10 +20,11 @@ mod read;
 mod shape;
 mod write;
 
-pub use anime::Sequence;
-pub use carry::{CarryError, rewrite_vertices};
-pub use error::{FEWEST_POINTS, ShapeError};
-pub use read::read;
+pub(crate) use anime::Sequence;
+pub(crate) use carry::{CarryError, rewrite_vertices};
+pub(crate) use error::{FEWEST_POINTS, ShapeError};
+pub(crate) use read::read;
 pub use shape::Shape;
 pub(crate) use shape::file_length;
-pub use write::{SurfaceFormat, WriteError, write_surface};
+pub use write::SurfaceFormat;
+pub(crate) use write::{WriteError, write_surface};

@@ -19,7 +19,7 @@ const BASE: &str = " up to that line, counted from 1, or back from -1";
 
 /// One corner of a face: positions in the file's lists of `v`, `vt` and `vn`, counted from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Corner {
+pub(super) struct Corner {
     /// Its vertex.
     pub vertex: u32,
     /// Its normal, if the face names one.
@@ -28,7 +28,7 @@ pub struct Corner {
 
 /// How many `v` and `vn` lines came before a line: what its negative indices count back from.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Counts {
+pub(super) struct Counts {
     /// Lines of vertices.
     pub vertices: usize,
     /// Lines of normals.
@@ -36,7 +36,7 @@ pub struct Counts {
 }
 
 /// The lines of a file as keyword and the rest, without the comment.
-pub fn statements(bytes: &[u8]) -> impl Iterator<Item = (&[u8], &[u8])> {
+pub(super) fn statements(bytes: &[u8]) -> impl Iterator<Item = (&[u8], &[u8])> {
     bytes.split(|&byte| byte == b'\n').map(|line| {
         let end = line
             .iter()
@@ -52,7 +52,7 @@ pub fn statements(bytes: &[u8]) -> impl Iterator<Item = (&[u8], &[u8])> {
 }
 
 /// The words of a statement; not UTF-8 shows as replacement characters and will not parse.
-pub fn words(rest: &[u8]) -> impl Iterator<Item = std::borrow::Cow<'_, str>> {
+pub(super) fn words(rest: &[u8]) -> impl Iterator<Item = std::borrow::Cow<'_, str>> {
     let words = rest
         .split(u8::is_ascii_whitespace)
         .filter(|word| !word.is_empty());
@@ -133,14 +133,14 @@ fn parse_vector(rest: &[u8]) -> Result<[f64; 3], String> {
             .ok_or_else(|| format!("{axis} coordinates, 3 needed"))?;
         *coordinate = word
             .parse()
-            .map_err(|_| format!("{word:?} is not a number"))?;
+            .map_err(|_unparsed| format!("{word:?} is not a number"))?;
     }
     Ok(vector)
 }
 
 /// Reads one corner `v`, `v/vt`, `v//vn` or `v/vt/vn`; negative indices count back from the last
 /// line before this one.
-pub fn parse_corner(word: &str, counts: Counts) -> Result<Corner, String> {
+pub(super) fn parse_corner(word: &str, counts: Counts) -> Result<Corner, String> {
     let mut parts = word.split('/');
     let vertex = parts.next().unwrap_or_default();
     let normal = parts.nth(1).filter(|part| !part.is_empty());
@@ -156,7 +156,7 @@ pub fn parse_corner(word: &str, counts: Counts) -> Result<Corner, String> {
 fn parse_index(part: &str, count: usize, word: &str) -> Result<u32, String> {
     let index: i64 = part
         .parse()
-        .map_err(|_| format!("{word:?} is not a corner of a face"))?;
+        .map_err(|_unparsed| format!("{word:?} is not a corner of a face"))?;
     let from_zero = if index < 0 {
         index.checked_add_unsigned(count as u64)
     } else {
@@ -270,12 +270,12 @@ pub(super) mod tests {
     use crate::formats;
 
     /// Two groups, a quad and a pentagon, negative indices, a comment, an unused vertex first.
-    pub const HOUSE: &str = "\
+    pub(crate) const HOUSE: &str = "\
 # a house\nmtllib none.mtl\nv 9 9 9 # unused\nv 0 0 0 1.0\nv 1 0 0 0.5 0.5 0.5\r\nv 1 1 0\nv 0 1 0\n\
 vt 0 0\nvn 0 0 2\ng wall\nusemtl stone\nf 2/1/1 3/1/1 4/1/1 5/1/1\ng gable\n\
 v 0 1 1\nv .5 1 1.5e0\nv 1 1 1\nf -5//1 -4//1 -1 -2 -3\n";
 
-    pub fn read_text(text: &str) -> Result<Shape, ShapeError> {
+    pub(crate) fn read_text(text: &str) -> Result<Shape, ShapeError> {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = folder.path().join("house.OBJ");
         std::fs::write(&path, text).expect("written");

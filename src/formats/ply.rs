@@ -23,7 +23,7 @@ use crate::geometry::linear::unit;
 const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
 
 /// An opened file whose header is read and found possible.
-pub struct PlyFile<'a> {
+pub(super) struct PlyFile<'a> {
     path: &'a Path,
     /// The header as the file has it.
     pub header: Header,
@@ -38,7 +38,7 @@ impl<'a> PlyFile<'a> {
     /// # Errors
     /// A file that cannot be read or is empty, a malformed header, or one whose counts need more
     /// bytes than the file has.
-    pub fn open(path: &'a Path) -> Result<Self, ShapeError> {
+    pub(super) fn open(path: &'a Path) -> Result<Self, ShapeError> {
         let length = file_length(path)?;
         let unreadable = |reason| ShapeError::Unreadable {
             path: path.to_owned(),
@@ -82,7 +82,7 @@ impl<'a> PlyFile<'a> {
     /// # Errors
     /// A payload that ends early or does not parse, named by element and index, and in ascii files
     /// by line; and what `keep` returns.
-    pub fn for_each<E: PropertyAccess>(
+    pub(super) fn for_each<E: PropertyAccess>(
         &mut self,
         mut keep: impl FnMut(&ElementDef, usize, E) -> Result<(), ShapeError>,
     ) -> Result<(), ShapeError> {

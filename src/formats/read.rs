@@ -16,7 +16,7 @@ use super::{obj, ply};
 /// that is missing, empty, truncated or not of its format, coordinates that are not finite, faces
 /// that refer to vertices that do not exist, a cloud of fewer than [`FEWEST_POINTS`](super::FEWEST_POINTS) points,
 /// vertices all in one place, no area.
-pub fn read(path: &Path) -> Result<Shape, ShapeError> {
+pub(crate) fn read(path: &Path) -> Result<Shape, ShapeError> {
     let extension = path
         .extension()
         .unwrap_or_default()

@@ -102,7 +102,7 @@ pub enum WriteError {
 /// # Errors
 /// Indices out of range, normals that do not match, coordinates that are not finite, or the file
 /// system's errors; in all cases `path` keeps what it held before.
-pub fn write_surface(
+pub(crate) fn write_surface(
     surface: &Mesh<f64>,
     path: &Path,
     format: SurfaceFormat,

@@ -50,7 +50,7 @@ pub(crate) fn areas(neighbours: &[Vec<Neighbour>]) -> Vec<f64> {
 /// The area of the surface that a point cloud was sampled from, estimated from its density:
 /// the sum of `pi r_k^2 / k` over all points with their k-th neighbour at `r_k`, k = 8; zero if there are
 /// no more points than that.
-pub fn cloud_area(points: &[[f64; 3]]) -> f64 {
+pub(crate) fn cloud_area(points: &[[f64; 3]]) -> f64 {
     if points.len() <= CLOUD_NEIGHBOURS {
         return 0.0;
     }

@@ -7,7 +7,7 @@ use super::mesh::Mesh;
 
 /// How the triangles of a mesh share their edges.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct EdgeSharing {
+pub(crate) struct EdgeSharing {
     /// Edges of exactly one triangle: where the mesh is open.
     pub open: usize,
     /// Edges of two triangles that are wound against each other.
@@ -19,7 +19,7 @@ pub struct EdgeSharing {
 impl EdgeSharing {
     /// Counts the edges. Vertices at the same position are one vertex here: files split them where
     /// texture coordinates jump, which leaves no gap in the surface.
-    pub fn of<T: Scalar>(mesh: &Mesh<T>) -> Self {
+    pub(crate) fn of<T: Scalar>(mesh: &Mesh<T>) -> Self {
         // For each undirected edge: how many triangles run along it upwards and downwards.
         let welded = weld(&mesh.vertices);
         let mut runs: HashMap<(u32, u32), [u32; 2]> =
@@ -48,7 +48,7 @@ impl EdgeSharing {
     }
 
     /// Whether every edge is shared by exactly two triangles wound alike: the mesh has an inside.
-    pub fn is_closed(&self) -> bool {
+    pub(crate) fn is_closed(&self) -> bool {
         *self == Self::default()
     }
 }

@@ -140,7 +140,10 @@ impl Mesh<f64> {
 /// # Panics
 /// If a triangle names a vertex that is not there.
 #[must_use]
-pub fn vertex_normals<T: Scalar>(vertices: &[[T; 3]], triangles: &[[u32; 3]]) -> Vec<[f32; 3]> {
+pub(crate) fn vertex_normals<T: Scalar>(
+    vertices: &[[T; 3]],
+    triangles: &[[u32; 3]],
+) -> Vec<[f32; 3]> {
     let mut sums = vec![[0.0; 3]; vertices.len()];
     for &triangle in triangles {
         // As long as twice the area: the sum is weighted by it without more ado.

@@ -26,10 +26,11 @@ mod neighbours;
 pub(crate) mod testing;
 pub(crate) mod winding;
 
-pub use density::cloud_area;
-pub use edges::EdgeSharing;
+pub(crate) use density::cloud_area;
+pub(crate) use edges::EdgeSharing;
 pub(crate) use edges::weld;
+pub(crate) use isomorph_training::data::Bounds;
 pub use linear::Scalar;
-pub use mesh::{Mesh, vertex_normals};
-pub use isomorph_training::data::Bounds;
-pub use neighbours::{Neighbour, NeighbourSearch};
+pub use mesh::Mesh;
+pub(crate) use mesh::vertex_normals;
+pub(crate) use neighbours::{Neighbour, NeighbourSearch};

@@ -19,7 +19,7 @@ const QUERIES_AT_LEAST: usize = 256;
 
 /// One found neighbour.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Neighbour {
+pub(crate) struct Neighbour {
     /// Its place in the points that were given.
     pub index: u32,
     /// Its squared distance from the query.
@@ -28,7 +28,7 @@ pub struct Neighbour {
 
 /// Points arranged for nearest-neighbour queries.
 #[derive(Debug)]
-pub struct NeighbourSearch<const DIMENSIONS: usize = 3> {
+pub(crate) struct NeighbourSearch<const DIMENSIONS: usize = 3> {
     tree: ImmutableKdTree<f64, u32, DIMENSIONS, BUCKET>,
 }
 
@@ -37,7 +37,7 @@ impl<const DIMENSIONS: usize> NeighbourSearch<DIMENSIONS> {
     ///
     /// # Panics
     /// If there are no points, or 2^32 or more.
-    pub fn new(points: &[[f64; DIMENSIONS]]) -> Self {
+    pub(crate) fn new(points: &[[f64; DIMENSIONS]]) -> Self {
         assert!(!points.is_empty(), "neighbours of no points");
         assert!(
             u32::try_from(points.len()).is_ok(),
@@ -50,7 +50,7 @@ impl<const DIMENSIONS: usize> NeighbourSearch<DIMENSIONS> {
     }
 
     /// The nearest point to `query`.
-    pub fn nearest_one(&self, query: [f64; DIMENSIONS]) -> Neighbour {
+    pub(crate) fn nearest_one(&self, query: [f64; DIMENSIONS]) -> Neighbour {
         let found = self.tree.nearest_one::<SquaredEuclidean>(&query);
         Neighbour {
             index: found.item,
@@ -60,7 +60,7 @@ impl<const DIMENSIONS: usize> NeighbourSearch<DIMENSIONS> {
 
     /// The `count` points nearest to `query`, nearest first; all of them if there are fewer. A
     /// query that is itself one of the points finds itself first, at distance 0.
-    pub fn nearest(&self, query: [f64; DIMENSIONS], count: NonZeroUsize) -> Vec<Neighbour> {
+    pub(crate) fn nearest(&self, query: [f64; DIMENSIONS], count: NonZeroUsize) -> Vec<Neighbour> {
         let found = self.tree.nearest_n::<SquaredEuclidean>(&query, count);
         let neighbour = |found: &kiddo::NearestNeighbour<f64, u32>| Neighbour {
             index: found.item,
@@ -70,7 +70,7 @@ impl<const DIMENSIONS: usize> NeighbourSearch<DIMENSIONS> {
     }
 
     /// [`Self::nearest`] of each query, on all cores; the order of the queries is kept.
-    pub fn nearest_of_each(
+    pub(crate) fn nearest_of_each(
         &self,
         queries: &[[f64; DIMENSIONS]],
         count: NonZeroUsize,
@@ -82,7 +82,7 @@ impl<const DIMENSIONS: usize> NeighbourSearch<DIMENSIONS> {
     }
 
     /// [`Self::nearest_one`] of each query, on all cores; the order of the queries is kept.
-    pub fn nearest_one_of_each(&self, queries: &[[f64; DIMENSIONS]]) -> Vec<Neighbour> {
+    pub(crate) fn nearest_one_of_each(&self, queries: &[[f64; DIMENSIONS]]) -> Vec<Neighbour> {
         queries
             .par_iter()
             .with_min_len(QUERIES_AT_LEAST)

@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use super::mesh::Mesh;
 
 /// The corner of the unit cube, wound outwards, moved by `offset` along every axis.
-pub fn tetrahedron(offset: f64) -> Mesh<f64> {
+pub(crate) fn tetrahedron(offset: f64) -> Mesh<f64> {
     let corners = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let vertices = corners
         .map(|corner| corner.map(|x: f64| x + offset))
@@ -15,7 +15,7 @@ pub fn tetrahedron(offset: f64) -> Mesh<f64> {
 }
 
 /// A box with these edges and a corner at the origin, wound outwards.
-pub fn cuboid(edges: [f64; 3]) -> Mesh<f64> {
+pub(crate) fn cuboid(edges: [f64; 3]) -> Mesh<f64> {
     let corner = |i: usize| [0, 1, 2].map(|axis| edges[axis] * (i >> axis & 1) as f64);
     let faces = [
         [0, 2, 3, 1],
@@ -33,7 +33,7 @@ pub fn cuboid(edges: [f64; 3]) -> Mesh<f64> {
 }
 
 /// Points uniform on the sphere of this radius about the origin.
-pub fn sphere_cloud(count: usize, radius: f64, seed: u64) -> Vec<[f64; 3]> {
+pub(crate) fn sphere_cloud(count: usize, radius: f64, seed: u64) -> Vec<[f64; 3]> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut point = || {
         let (z, angle) = (
@@ -51,7 +51,12 @@ pub fn sphere_cloud(count: usize, radius: f64, seed: u64) -> Vec<[f64; 3]> {
 }
 
 /// Points uniform on the torus about the z axis with these radii, and its outward normals there.
-pub fn torus_cloud(count: usize, ring: f64, tube: f64, seed: u64) -> Vec<([f64; 3], [f64; 3])> {
+pub(crate) fn torus_cloud(
+    count: usize,
+    ring: f64,
+    tube: f64,
+    seed: u64,
+) -> Vec<([f64; 3], [f64; 3])> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut points = Vec::with_capacity(count);
     while points.len() < count {

@@ -33,7 +33,7 @@ const FAR: f64 = 3.0;
 ///
 /// # Panics
 /// If there are no points.
-pub fn is_inside_out(points: &[[f64; 3]], normals: &[[f32; 3]]) -> bool {
+pub(crate) fn is_inside_out(points: &[[f64; 3]], normals: &[[f32; 3]]) -> bool {
     let neighbours = NeighbourSearch::new(points).nearest_of_each(points, NEIGHBOURS);
     let centre = mean(points.iter().copied());
     let discs = areas(&neighbours)
@@ -60,7 +60,7 @@ struct Node {
 
 /// Points arranged for sums over all of them.
 #[derive(Debug)]
-pub struct SummationTree {
+pub(crate) struct SummationTree {
     /// The place of each point among those that were given.
     order: Vec<u32>,
     points: Vec<[f64; 3]>,
@@ -71,7 +71,7 @@ pub struct SummationTree {
 
 /// A vector of `D` numbers at each point and their sums over each group of points.
 #[derive(Debug)]
-pub struct Charges<const D: usize> {
+pub(crate) struct Charges<const D: usize> {
     points: Vec<[f64; D]>,
     nodes: Vec<[f64; D]>,
 }
@@ -81,7 +81,7 @@ impl SummationTree {
     ///
     /// # Panics
     /// If there are no points, 2^32 or more, or not as many lengths.
-    pub fn new(points: &[[f64; 3]], softening: &[f64]) -> Self {
+    pub(crate) fn new(points: &[[f64; 3]], softening: &[f64]) -> Self {
         assert!(!points.is_empty(), "sums over no points");
         assert_eq!(points.len(), softening.len(), "one length per point");
         let count = u32::try_from(points.len()).expect("fewer than 2^32 points");
@@ -98,12 +98,12 @@ impl SummationTree {
     }
 
     /// The points in the tree's order, as numbers of those that were given: near ones together.
-    pub fn order(&self) -> &[u32] {
+    pub(crate) fn order(&self) -> &[u32] {
         &self.order
     }
 
     /// Charges of the points, in the order in which the points were given, made ready for sums.
-    pub fn charges<const D: usize>(&self, of_points: &[[f64; D]]) -> Charges<D> {
+    pub(crate) fn charges<const D: usize>(&self, of_points: &[[f64; D]]) -> Charges<D> {
         let ordered = self.order.iter().map(|&k| of_points[k as usize]);
         let points: Vec<[f64; D]> = ordered.collect();
         let total = |node: &Node| {
@@ -119,7 +119,7 @@ impl SummationTree {
     }
 
     /// The winding number about `x` of points with these dipoles, area times outward normal.
-    pub fn winding(&self, dipoles: &Charges<3>, x: [f64; 3]) -> f64 {
+    pub(crate) fn winding(&self, dipoles: &Charges<3>, x: [f64; 3]) -> f64 {
         let sum = std::cell::Cell::new(0.0);
         let add = |dipole: [f64; 3], place: [f64; 3], softening: f64| {
             let away = difference(place, x);
@@ -140,7 +140,7 @@ impl SummationTree {
     /// group of dipoles as one without softening, here a far group of charges is one and the disc
     /// keeps its own softening: they differ by about 1.5 `(softening length / distance)^2`, beyond
     /// three radii of the group. And which points form one group differs between the two.
-    pub fn pull(&self, charges: &Charges<1>, x: [f64; 3], softening: f64) -> [f64; 3] {
+    pub(crate) fn pull(&self, charges: &Charges<1>, x: [f64; 3], softening: f64) -> [f64; 3] {
         let sum = std::cell::Cell::new([0.0; 3]);
         let add = |[charge]: [f64; 1], place: [f64; 3]| {
             let away = difference(x, place);

@@ -48,11 +48,11 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-pub use error::MatchError;
+pub(crate) use error::MatchError;
 pub use options::MatchOptions;
 pub use outcome::{Coverage, Cycle, Matching, Quantiles, Rigid};
 pub use pairs::MatchedPair;
-pub use rotation::RigidMotion;
+pub(crate) use rotation::RigidMotion;
 
 use crate::shape::{Normalisation, Shape};
 use pairs::{Laid, Sites};
@@ -60,7 +60,7 @@ use surface::{NodeMotion, Surface, farthest_points};
 
 /// A surface counts as covered where a matched vertex is within this distance, in normalised units
 /// (mean area 1).
-pub const COVERAGE_RADIUS: f64 = 0.05;
+pub(crate) const COVERAGE_RADIUS: f64 = 0.05;
 
 /// Finds the vertices of two shapes that belong together.
 ///
@@ -69,7 +69,7 @@ pub const COVERAGE_RADIUS: f64 = 0.05;
 /// # Errors
 /// [`MatchError::Option`] if an option is out of range, [`MatchError::Shape`] if a shape has no
 /// area, [`MatchError::NoPairs`] if nothing is sure enough.
-pub fn match_shapes(
+pub(crate) fn match_shapes(
     source: &Shape,
     target: &Shape,
     options: &MatchOptions,

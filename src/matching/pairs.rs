@@ -22,7 +22,7 @@ use crate::shape::{NeighbourSearch, Normalisation, Shape};
 
 /// The distance at which a pair is no longer sure, in normalised units, about the spacing of 2,500
 /// points: `tau` in the confidence `exp(-r^2 / (2 tau^2)) cos`.
-pub const TOLERANCE: f64 = 0.02;
+pub(super) const TOLERANCE: f64 = 0.02;
 
 /// One pair of vertices.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

@@ -11,7 +11,7 @@ use crate::geometry::linear::{
 
 /// `x -> rotation x + translation`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RigidMotion {
+pub(crate) struct RigidMotion {
     /// By rows; proper: of determinant 1.
     pub rotation: [[f64; 3]; 3],
     /// In the unit of the points.
@@ -20,19 +20,19 @@ pub struct RigidMotion {
 
 impl RigidMotion {
     /// The motion that leaves all in place.
-    pub const IDENTITY: Self = Self {
+    pub(crate) const IDENTITY: Self = Self {
         rotation: IDENTITY,
         translation: [0.0; 3],
     };
 
     /// Where a point goes.
-    pub fn apply(&self, x: [f64; 3]) -> [f64; 3] {
+    pub(crate) fn apply(&self, x: [f64; 3]) -> [f64; 3] {
         add(times(&self.rotation, x), self.translation)
     }
 
     /// The motion back.
     #[must_use]
-    pub fn inverse(&self) -> Self {
+    pub(crate) fn inverse(&self) -> Self {
         let rotation = transposed(&self.rotation);
         Self {
             translation: times(&rotation, self.translation).map(|part| -part),
@@ -41,7 +41,7 @@ impl RigidMotion {
     }
 
     /// The angle of the rotation in radians, 0 to pi.
-    pub fn angle(&self) -> f64 {
+    pub(crate) fn angle(&self) -> f64 {
         let [a, b, c] = self.rotation;
         ((a[0] + b[1] + c[2] - 1.0) / 2.0).clamp(-1.0, 1.0).acos()
     }
@@ -114,7 +114,7 @@ pub(super) mod tests {
     use crate::geometry::linear::{cross, determinant, dot, length, product};
 
     /// By Rodrigues' formula about the axis (2, -1, 2) / 3.
-    pub fn turn(angle: f64) -> Matrix {
+    pub(crate) fn turn(angle: f64) -> Matrix {
         let axis = [2.0 / 3.0, -1.0 / 3.0, 2.0 / 3.0];
         let (sin, cos) = angle.sin_cos();
         let mut columns = [[0.0; 3]; 3];

@@ -10,7 +10,7 @@ const MARGIN: f32 = 0.06;
 
 /// From where and how large the surfaces are seen.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct View {
+pub(crate) struct View {
     /// Turn of the camera about the y axis, which is up, in degrees. At 0 the camera stands on the z
     /// axis, at 90 on the x axis.
     pub azimuth: f32,

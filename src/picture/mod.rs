@@ -22,8 +22,8 @@ use rayon::prelude::*;
 use crate::atomic::write_atomically;
 use crate::geometry::vertex_normals;
 use camera::Camera;
+pub(crate) use camera::View;
 use canvas::Canvas;
-pub use camera::View;
 use raster::Projected;
 
 const WHITE: [u8; 3] = [255; 3];
@@ -35,7 +35,7 @@ const INK: f32 = 0.6;
 
 /// One surface of a strip.
 #[derive(Clone, Copy, Debug)]
-pub struct Frame<'a> {
+pub(crate) struct Frame<'a> {
     /// Vertex positions.
     pub vertices: &'a [[f32; 3]],
     /// Vertex indices, counter-clockwise seen from outside.
@@ -46,7 +46,7 @@ pub struct Frame<'a> {
 
 /// A strip that cannot be drawn.
 #[derive(Debug, thiserror::Error)]
-pub enum PictureError {
+pub(crate) enum PictureError {
     /// No surface, or no room for one.
     #[error("{0}: nothing to draw; give at least one surface and a height of at least one pixel")]
     Empty(String),
@@ -66,7 +66,7 @@ pub enum PictureError {
 ///
 /// # Errors
 /// [`PictureError`]; then no file is written.
-pub fn strip(frames: &[Frame<'_>], view: &View, path: &Path) -> Result<(), PictureError> {
+pub(crate) fn strip(frames: &[Frame<'_>], view: &View, path: &Path) -> Result<(), PictureError> {
     check(frames, view, path)?;
     let points = frames.iter().flat_map(|frame| frame.vertices);
     let camera = Camera::new(points.map(|&point| point.into()), view, text_width(LABEL));
@@ -83,7 +83,12 @@ pub fn strip(frames: &[Frame<'_>], view: &View, path: &Path) -> Result<(), Pictu
             picture.put(x, y, pixel);
         }
         let label = format!("t = {:.2}", frame.time);
-        write(&mut picture, &label, left + camera.width / 2, view.height as usize);
+        write(
+            &mut picture,
+            &label,
+            left + camera.width / 2,
+            view.height as usize,
+        );
     }
     let png = picture.png().map_err(io::Error::other)?;
     Ok(write_atomically(path, |out| out.write_all(&png))?)
@@ -216,8 +221,7 @@ mod tests {
     fn light_comes_from_the_upper_left_and_the_colour_follows_the_time() {
         let picture = drawn(&[ball(1.0), ball(1.0)]);
         let half = picture.width() / 2;
-        let brightness =
-            |x: usize, y: usize| picture.get(x, y).map(u32::from).iter().sum::<u32>();
+        let brightness = |x: usize, y: usize| picture.get(x, y).map(u32::from).iter().sum::<u32>();
         assert!(brightness(70, 60) > brightness(130, 140) + 60);
         let [red, _, blue] = picture.get(100, 100);
         assert!(blue > red, "at time 0");

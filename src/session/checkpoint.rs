@@ -23,13 +23,13 @@ use crate::recipe::{Recipe, RecipeError};
 use crate::shape::{Bounds, Normalisation};
 
 /// The layout of a checkpoint; raised when an older isomorph could not read it.
-pub const FORMAT_VERSION: u32 = 1;
+pub(crate) const FORMAT_VERSION: u32 = 1;
 
 const STATE: &str = "state.json";
 
 /// What `state.json` holds.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct State {
+pub(crate) struct State {
     /// [`FORMAT_VERSION`] of the writer.
     pub format_version: u32,
     /// The release of isomorph that wrote it.
@@ -56,7 +56,7 @@ pub struct State {
 
 /// What a file must look like.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct FileDigest {
+pub(crate) struct FileDigest {
     /// Its length in bytes.
     pub bytes: u64,
     /// CRC-32 of its content.
@@ -115,7 +115,7 @@ pub enum CheckpointError {
 
 /// A checkpoint on the disk whose `state.json` has been read.
 #[derive(Clone, Debug)]
-pub struct Checkpoint {
+pub(crate) struct Checkpoint {
     /// Its folder.
     pub path: PathBuf,
     /// What it says of itself.
@@ -127,7 +127,7 @@ impl Checkpoint {
     ///
     /// # Errors
     /// [`CheckpointError`] if `state.json` is missing, damaged or too new.
-    pub fn open(path: &Path) -> Result<Self, CheckpointError> {
+    pub(crate) fn open(path: &Path) -> Result<Self, CheckpointError> {
         let file = path.join(STATE);
         let text = fs::read_to_string(&file).map_err(|reason| CheckpointError::Io {
             path: file.clone(),
@@ -153,7 +153,7 @@ impl Checkpoint {
     ///
     /// # Errors
     /// [`CheckpointError::None`] if there is none; that of [`Self::open`] if it is damaged.
-    pub fn newest(folder: &Path) -> Result<Self, CheckpointError> {
+    pub(crate) fn newest(folder: &Path) -> Result<Self, CheckpointError> {
         match list(folder).last() {
             Some((_, path)) => Self::open(path),
             None => Err(CheckpointError::None(folder.to_path_buf())),
@@ -164,7 +164,7 @@ impl Checkpoint {
     ///
     /// # Errors
     /// [`CheckpointError::Recipe`] if it no longer parses.
-    pub fn recipe(&self) -> Result<Recipe, CheckpointError> {
+    pub(crate) fn recipe(&self) -> Result<Recipe, CheckpointError> {
         let origin = self.path.join("recipe.toml");
         let (recipe, _) = Recipe::parse_stored(&self.state.recipe, &origin)?;
         Ok(recipe)
@@ -175,7 +175,7 @@ impl Checkpoint {
     /// # Errors
     /// [`CheckpointError::Damaged`] if one is not what was written, [`CheckpointError::Io`] if it cannot be
     /// read.
-    pub fn records(&self) -> Result<Records, CheckpointError> {
+    pub(crate) fn records(&self) -> Result<Records, CheckpointError> {
         let read = |(file, wanted): (&String, &FileDigest)| {
             let path = self.path.join(file);
             let content = fs::read(&path).map_err(|reason| CheckpointError::Io {
@@ -198,7 +198,7 @@ impl Checkpoint {
     }
 
     /// A record of this checkpoint that is not what the method takes.
-    pub fn damaged(&self, error: RecordError) -> CheckpointError {
+    pub(crate) fn damaged(&self, error: RecordError) -> CheckpointError {
         CheckpointError::Damaged {
             path: self.path.join(error.file),
             problem: error.problem,
@@ -210,7 +210,7 @@ impl Checkpoint {
 ///
 /// # Errors
 /// [`CheckpointError::Io`]; nothing is left under the final name then.
-pub fn save(
+pub(crate) fn save(
     folder: &Path,
     mut state: State,
     files: Records,
@@ -258,7 +258,7 @@ pub fn save(
 }
 
 /// The checkpoints in a folder, oldest first.
-pub fn list(folder: &Path) -> Vec<(usize, PathBuf)> {
+pub(crate) fn list(folder: &Path) -> Vec<(usize, PathBuf)> {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     let mut found: Vec<_> = entries
         .filter_map(|entry| {
@@ -272,7 +272,7 @@ pub fn list(folder: &Path) -> Vec<(usize, PathBuf)> {
 }
 
 /// Deletes what an interrupted [`save`] left behind.
-pub fn sweep(folder: &Path) {
+pub(crate) fn sweep(folder: &Path) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         if entry.file_name().to_string_lossy().starts_with(".step-") {
             // Only unused space is at stake: not worth stopping for.

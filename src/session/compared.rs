@@ -19,7 +19,7 @@ use crate::event::Event;
 use crate::recipe::Recipe;
 
 /// The pairs that a run made with this recipe has found, if it is there to be gone on with.
-pub fn stored_pairs(path: &Path, recipe: &Recipe) -> Option<PathBuf> {
+pub(super) fn stored_pairs(path: &Path, recipe: &Recipe) -> Option<PathBuf> {
     let run = RunFolder::open(path).ok()?;
     is_of(&run, recipe).then(|| run.pairs())
 }
@@ -45,7 +45,7 @@ fn open_or_create(path: &Path, recipe: &Recipe) -> Result<(RunFolder, Option<Che
 }
 
 /// What came out of one method on one pair.
-pub struct Made {
+pub(super) struct Made {
     pub networks: Vec<Network>,
     pub training_seconds: f64,
     pub evaluation_seconds: f64,
@@ -57,7 +57,7 @@ pub struct Made {
 /// # Errors
 /// Of kind [`Interruption`](crate::ErrorKind::Interruption) if it was stopped; else what keeps the method
 /// from being trained or measured.
-pub fn make(
+pub(super) fn make(
     path: &Path,
     recipe: &Recipe,
     prepared: &Prepared,

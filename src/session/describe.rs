@@ -8,18 +8,17 @@ use isomorph_training::method::spec_of;
 use super::checkpoint::{self, Checkpoint};
 use super::folder::RunFolder;
 use crate::error::{Error, Result};
-use crate::recipe::Recipe;
 use crate::formats::{self, Sequence, Shape};
 use crate::geometry::EdgeSharing;
+use crate::recipe::Recipe;
 
 /// Says what is at a path: a shape, a sequence (`.anime`), a recipe (`.toml`) or a run.
 ///
 /// # Errors
 /// What cannot be read, and why.
 pub fn describe(path: &Path) -> Result<String> {
-    std::fs::metadata(path).map_err(|error| {
-        Error::failure(error).within(&path.display().to_string())
-    })?;
+    std::fs::metadata(path)
+        .map_err(|error| Error::failure(error).within(&path.display().to_string()))?;
     let extension = path.extension().and_then(|text| text.to_str());
     let extension = extension.unwrap_or_default().to_ascii_lowercase();
     match extension.as_str() {

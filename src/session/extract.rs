@@ -78,7 +78,10 @@ impl Trained {
         log: &mut RunLog,
         on_event: &mut dyn FnMut(&Event),
     ) -> Result<PathBuf> {
-        options.times.iter().try_for_each(|time| check_time(*time))?;
+        options
+            .times
+            .iter()
+            .try_for_each(|time| check_time(*time))?;
         if !(0.0..=1.0).contains(&options.smallest_component) {
             return Err(Error::usage(format!(
                 "smallest component {}: must be 0 to 1 (0 keeps every piece)",
@@ -90,7 +93,9 @@ impl Trained {
             times: options.times.clone(),
             resolution: options.resolution,
             format: options.format,
-            carry: options.carry.then(|| self.recipe().data.source().to_owned()),
+            carry: options
+                .carry
+                .then(|| self.recipe().data.source().to_owned()),
             smallest_component: options.smallest_component,
             folder: folder.unwrap_or_else(|| self.folder().meshes()),
         };

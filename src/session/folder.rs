@@ -16,9 +16,7 @@ use crate::recipe::{Recipe, RecipeError};
 #[derive(Debug, thiserror::Error)]
 pub enum FolderError {
     /// Something is there already.
-    #[error(
-        "{0}: exists already; resume the run in it, choose another folder, or replace it"
-    )]
+    #[error("{0}: exists already; resume the run in it, choose another folder, or replace it")]
     Exists(PathBuf),
     /// Something is there that is not a run, which is never deleted.
     #[error(
@@ -45,14 +43,18 @@ pub fn is_run(path: &Path) -> bool {
 
 /// The folder of one run.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct RunFolder(PathBuf);
+pub(crate) struct RunFolder(PathBuf);
 
 impl RunFolder {
     /// Makes the folder of a new run and writes the resolved recipe into it.
     ///
     /// # Errors
     /// [`FolderError`]; with `replace` an older run there is deleted first, and nothing but a run ever is.
-    pub fn create(path: &Path, recipe: &str, replace: bool) -> std::result::Result<Self, FolderError> {
+    pub(crate) fn create(
+        path: &Path,
+        recipe: &str,
+        replace: bool,
+    ) -> std::result::Result<Self, FolderError> {
         let io = |reason| FolderError::Io {
             path: path.to_path_buf(),
             reason,
@@ -82,7 +84,7 @@ impl RunFolder {
     ///
     /// # Errors
     /// [`FolderError::Missing`] if it holds no recipe.
-    pub fn open(path: &Path) -> std::result::Result<Self, FolderError> {
+    pub(crate) fn open(path: &Path) -> std::result::Result<Self, FolderError> {
         let run = Self(path.to_path_buf());
         if run.recipe().is_file() {
             Ok(run)
@@ -96,35 +98,37 @@ impl RunFolder {
     ///
     /// # Errors
     /// What [`Recipe::parse_stored`] refuses, or the file system.
-    pub fn stored_recipe(&self) -> Result<(Recipe, Vec<String>)> {
+    pub(crate) fn stored_recipe(&self) -> Result<(Recipe, Vec<String>)> {
         let path = self.recipe();
-        let text = fs::read_to_string(&path)
-            .map_err(|reason| RecipeError::Unreadable { path: path.clone(), reason })?;
+        let text = fs::read_to_string(&path).map_err(|reason| RecipeError::Unreadable {
+            path: path.clone(),
+            reason,
+        })?;
         Ok(Recipe::parse_stored(&text, &path)?)
     }
 
     /// The folder itself.
-    pub fn path(&self) -> &Path {
+    pub(crate) fn path(&self) -> &Path {
         &self.0
     }
 
     /// The resolved recipe.
-    pub fn recipe(&self) -> PathBuf {
+    pub(crate) fn recipe(&self) -> PathBuf {
         self.0.join("recipe.toml")
     }
 
     /// The pairs that were found by matching.
-    pub fn pairs(&self) -> PathBuf {
+    pub(crate) fn pairs(&self) -> PathBuf {
         self.0.join("pairs.csv")
     }
 
     /// The folder of checkpoints.
-    pub fn checkpoints(&self) -> PathBuf {
+    pub(crate) fn checkpoints(&self) -> PathBuf {
         self.0.join("checkpoints")
     }
 
     /// The folder of extracted surfaces.
-    pub fn meshes(&self) -> PathBuf {
+    pub(crate) fn meshes(&self) -> PathBuf {
         self.0.join("meshes")
     }
 

@@ -6,15 +6,15 @@ use isomorph_training::method::spec_of;
 
 use super::checkpoint::Checkpoint;
 use crate::error::{Error, Result};
-use crate::recipe::Recipe;
 use crate::formats;
 use crate::geometry::{Bounds, Mesh};
+use crate::recipe::Recipe;
 use crate::shape::Normalisation;
 use crate::surface::learned::Learned;
 
 /// The frame of the key frames: where the user's coordinates lie in the networks'.
 #[derive(Clone, Copy, Debug)]
-pub struct Frame {
+pub(super) struct Frame {
     pub normalisation: Normalisation,
     pub bounds: Bounds,
 }
@@ -23,7 +23,7 @@ pub struct Frame {
 ///
 /// # Errors
 /// If the method has no surface of its own and the source is not a mesh that could be carried.
-pub fn learned(
+pub(super) fn learned(
     deformation: Box<dyn Deformation>,
     recipe: &Recipe,
     frame: Frame,
@@ -44,7 +44,7 @@ pub fn learned(
 ///
 /// # Errors
 /// If the method carries the source's mesh and it is a cloud.
-pub fn check(recipe: &Recipe, normalisation: &Normalisation) -> Result<()> {
+pub(super) fn check(recipe: &Recipe, normalisation: &Normalisation) -> Result<()> {
     if spec_of(recipe).needs.mesh {
         template(recipe, normalisation)?;
     }
@@ -69,7 +69,11 @@ fn template(recipe: &Recipe, normalisation: &Normalisation) -> Result<Mesh<f32>>
 ///
 /// # Errors
 /// If it is damaged, and what [`learned`] refuses.
-pub fn load(checkpoint: &Checkpoint, recipe: &Recipe, engine: &dyn Engine) -> Result<Learned> {
+pub(super) fn load(
+    checkpoint: &Checkpoint,
+    recipe: &Recipe,
+    engine: &dyn Engine,
+) -> Result<Learned> {
     let state = &checkpoint.state;
     let mut trainer = engine.method(recipe, &state.bounds)?;
     let restored = trainer.restore(&checkpoint.records()?);

@@ -66,7 +66,7 @@ pub enum LearnerError {
 
 /// How a run ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Outcome {
+pub(crate) enum Outcome {
     /// All steps are done.
     Finished,
     /// Stopped on request; a checkpoint holds everything up to here.
@@ -74,7 +74,7 @@ pub enum Outcome {
 }
 
 /// A method, its data, and where training stands.
-pub struct Learner {
+pub(crate) struct Learner {
     recipe: Recipe,
     data: TrainingData,
     normalisation: Normalisation,
@@ -91,7 +91,7 @@ impl Learner {
     /// # Errors
     /// [`LearnerError::Missing`] if the recipe's method needs normals or correspondences and there are
     /// none; [`LearnerError::NotHere`].
-    pub fn new(
+    pub(crate) fn new(
         recipe: Recipe,
         keyframes: &Keyframes,
         engine: &dyn Engine,
@@ -115,7 +115,7 @@ impl Learner {
     /// # Errors
     /// [`LearnerError::OtherNetworks`] if a network section differs, with both values;
     /// [`LearnerError::OtherShapes`]; [`LearnerError::Checkpoint`] if the checkpoint is damaged.
-    pub fn resume(
+    pub(crate) fn resume(
         recipe: Recipe,
         keyframes: &Keyframes,
         engine: &dyn Engine,
@@ -131,12 +131,12 @@ impl Learner {
     }
 
     /// What is trained, as it stands.
-    pub fn trainer(&self) -> &dyn Trainer {
+    pub(crate) fn trainer(&self) -> &dyn Trainer {
         &*self.trainer
     }
 
     /// Seconds of training so far, over all resumes.
-    pub fn seconds(&self) -> f64 {
+    pub(crate) fn seconds(&self) -> f64 {
         self.seconds
     }
 
@@ -144,7 +144,7 @@ impl Learner {
     ///
     /// # Errors
     /// [`LearnerError`]; the checkpoints written so far stay.
-    pub fn run(
+    pub(crate) fn run(
         &mut self,
         checkpoints: &Path,
         stop: &AtomicBool,
@@ -196,7 +196,7 @@ impl Learner {
     }
 
     /// One step of the optimisers; the unweighted terms with their weights if `read` asks for them.
-    pub fn advance(&mut self, read: bool) -> Option<Vec<TermReport>> {
+    pub(crate) fn advance(&mut self, read: bool) -> Option<Vec<TermReport>> {
         let report = self.trainer.advance(&self.data, self.step, read);
         self.step += 1;
         report
@@ -296,7 +296,7 @@ impl Learner {
 /// # Errors
 /// [`LearnerError::OtherNetworks`], [`LearnerError::OtherShapes`], and [`LearnerError::Checkpoint`] if the
 /// checkpoint's recipe no longer parses.
-pub fn fits(
+pub(crate) fn fits(
     checkpoint: &Checkpoint,
     recipe: &Recipe,
     keyframes: &Keyframes,

@@ -17,7 +17,7 @@ use crate::event::{Event, StepReport};
 
 /// `run.log` and `metrics.jsonl` of one run.
 #[derive(Debug)]
-pub struct RunLog {
+pub(super) struct RunLog {
     run: PathBuf,
     log: File,
     /// Opened by the first event of training: extraction leaves the metrics alone.
@@ -33,7 +33,7 @@ impl RunLog {
     ///
     /// # Errors
     /// What the file system says; the message names the file.
-    pub fn open(run: &Path, resumed_from: Option<usize>) -> io::Result<Self> {
+    pub(super) fn open(run: &Path, resumed_from: Option<usize>) -> io::Result<Self> {
         let path = run.join("run.log");
         let log = append(&path)
             .and_then(end_torn_line)
@@ -50,7 +50,7 @@ impl RunLog {
     ///
     /// # Errors
     /// What the file system says; the message names the file.
-    pub fn record(&mut self, event: &Event) -> io::Result<()> {
+    pub(super) fn record(&mut self, event: &Event) -> io::Result<()> {
         if let Some(text) = event.line(None) {
             let stamped = stamped(SystemTime::now(), &text);
             let written = self.log.write_all(stamped.as_bytes());

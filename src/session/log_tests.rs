@@ -12,8 +12,7 @@ fn started(first_step: usize) -> Event {
         steps: 100,
         first_step,
         networks: vec![("f", 1), ("V", 1)],
-        source_points: 1,
-        target_points: 1,
+        points: vec![1, 1],
         correspondences: 0,
     }
 }

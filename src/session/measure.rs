@@ -2,13 +2,13 @@
 
 use std::ops::ControlFlow;
 
-use crate::error::{Error, Result};
 use crate::cubes::{ExtractError, Grid, GridError};
+use crate::error::{Error, Result};
 use crate::evaluate::{Candidate, Carried, EvaluateError, Evaluation, Purpose, Reference};
 use crate::event::Event;
+use crate::geometry::Mesh;
 use crate::session::stop::StopFlag;
 use crate::shape::Normalisation;
-use crate::geometry::Mesh;
 use crate::surface::FramesError;
 use crate::surface::learned::Learned;
 
@@ -20,7 +20,7 @@ const COARSE: usize = 48;
 const ANCHORS: f64 = 16.0;
 
 /// Where and how closely a method is measured.
-pub struct Ruler<'a> {
+pub(super) struct Ruler<'a> {
     /// The true frames.
     pub reference: &'a Reference,
     /// The coordinates of the true frames: those of the true ends, whatever the method was given.
@@ -155,7 +155,7 @@ impl Candidate for Measured<'_> {
 /// # Errors
 /// Of kind [`Interruption`](crate::ErrorKind::Interruption) if it was stopped; else what keeps the method
 /// from being measured: a field that is not finite, for one.
-pub fn measure(
+pub(super) fn measure(
     learned: &Learned,
     ruler: &Ruler,
     on_event: &mut dyn FnMut(&Event),

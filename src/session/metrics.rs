@@ -18,7 +18,7 @@ use crate::atomic::write_atomically;
 use crate::event::{Phase, StepReport};
 
 /// The file's name in the folder of a run.
-pub const FILE: &str = "metrics.jsonl";
+pub(crate) const FILE: &str = "metrics.jsonl";
 
 /// One logged step.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -18,25 +18,25 @@
 //! | `log.rs`, `metrics.rs` | what a run leaves in writing: `run.log`, `metrics.jsonl` |
 //! | `stop.rs` | a flag that ends the work early |
 
-pub mod bench;
-pub mod checkpoint;
-pub mod compare;
+pub(crate) mod bench;
+pub(crate) mod checkpoint;
+pub(crate) mod compare;
 mod compared;
-pub mod describe;
-pub mod evaluate;
-pub mod extract;
-pub mod folder;
+pub(crate) mod describe;
+pub(crate) mod evaluate;
+pub(crate) mod extract;
+pub(crate) mod folder;
 mod learned;
-pub mod learner;
+pub(crate) mod learner;
 mod log;
 mod measure;
-pub mod metrics;
-pub mod normals;
-pub mod pairs;
+pub(crate) mod metrics;
+pub(crate) mod normals;
+pub(crate) mod pairs;
 mod prepare;
-pub mod stop;
-pub mod train;
-pub mod trained;
+pub(crate) mod stop;
+pub(crate) mod train;
+pub(crate) mod trained;
 
 pub use train::Session;
 pub use trained::Trained;

@@ -70,9 +70,8 @@ impl Estimate {
     /// # Errors
     /// Another ending; what the file system says.
     pub fn write(&self, path: &Path) -> Result<()> {
-        let format = SurfaceFormat::of(path).ok_or_else(|| {
-            Error::usage(format!("{}: must end in .ply or .obj", path.display()))
-        })?;
+        let format = SurfaceFormat::of(path)
+            .ok_or_else(|| Error::usage(format!("{}: must end in .ply or .obj", path.display())))?;
         Ok(write_surface(&self.cloud, path, format)?)
     }
 }

@@ -5,8 +5,8 @@ use std::path::Path;
 use crate::atomic::write_atomically;
 use crate::charts::{ChartError, Line, Panel, line_chart};
 use crate::error::{Error, Result};
-use crate::matching::{MatchOptions, Matching, match_shapes};
 use crate::formats::Shape;
+use crate::matching::{MatchOptions, Matching, match_shapes};
 
 /// Finds which vertices of two shapes correspond: two poses or states of one thing, as meshes or point
 /// clouds, complete or with parts missing. The same shapes and options give the same pairs, whatever the

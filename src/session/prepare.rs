@@ -4,16 +4,16 @@ use std::path::Path;
 
 use crate::error::Result;
 use crate::event::Event;
+use crate::formats::{self, Shape};
 use crate::matching::{MatchOptions, Matching, match_shapes};
 use crate::recipe::{self, Recipe};
 use crate::session::folder::RunFolder;
-use crate::formats::{self, Shape};
 use crate::shape::{
     self, CorrespondenceSource, Correspondences, DataOptions, Keyframes, NormalSource,
 };
 
 /// Shapes ready for training.
-pub struct Prepared {
+pub(super) struct Prepared {
     pub keyframes: Keyframes,
     /// What matching found just now, which the run does not hold yet.
     found: Option<Matching>,
@@ -23,7 +23,7 @@ pub struct Prepared {
 ///
 /// # Errors
 /// What [`formats::read`] refuses.
-pub fn read(recipe: &Recipe) -> Result<Vec<Shape>> {
+pub(super) fn read(recipe: &Recipe) -> Result<Vec<Shape>> {
     let shapes = recipe
         .data
         .keyframes
@@ -37,7 +37,7 @@ pub fn read(recipe: &Recipe) -> Result<Vec<Shape>> {
 ///
 /// # Errors
 /// What [`shape::prepare`] and [`match_shapes`] refuse.
-pub fn prepare(
+pub(super) fn prepare(
     recipe: &Recipe,
     shapes: &[Shape],
     stored: Option<&Path>,
@@ -86,7 +86,7 @@ fn matched(
 ///
 /// # Errors
 /// What [`shape::prepare`] refuses.
-pub fn points_only(recipe: &Recipe) -> Result<Keyframes> {
+pub(super) fn points_only(recipe: &Recipe) -> Result<Keyframes> {
     let shapes = read(recipe)?;
     let unknown = recipe.data.between.iter();
     let unknown = unknown.map(|_| CorrespondenceSource::None).collect();
@@ -139,7 +139,7 @@ impl Prepared {
     ///
     /// # Errors
     /// What the file system says; the message names the file.
-    pub fn keep(&self, run: &RunFolder) -> std::io::Result<Option<Event>> {
+    pub(super) fn keep(&self, run: &RunFolder) -> std::io::Result<Option<Event>> {
         let Some(found) = &self.found else {
             return Ok(None);
         };

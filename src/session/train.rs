@@ -16,9 +16,9 @@ use crate::atomic::write_atomically;
 use crate::backend::Backend;
 use crate::error::{Error, Result};
 use crate::event::Event;
+use crate::formats::Shape;
 use crate::recipe::Recipe;
 use crate::session::extract::ExtractOptions;
-use crate::formats::Shape;
 
 /// A run that is about to be trained: a recipe, its shapes, a folder and a backend.
 ///

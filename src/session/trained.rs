@@ -150,7 +150,12 @@ impl Trained {
         check_time(t)?;
         let learned = &self.learned;
         let grid = Grid::new(learned.bounds.min, learned.bounds.max, resolution)?;
-        let found = learned.surface_at(&grid, t, self.recipe.result.smallest_component, &mut progress)?;
+        let found = learned.surface_at(
+            &grid,
+            t,
+            self.recipe.result.smallest_component,
+            &mut progress,
+        )?;
         let (normals, _) = learned.normals(&found.mesh, t);
         let mut mesh = found.mesh.moved(|x| learned.normalisation.invert(x));
         mesh.normals = Some(normals);
@@ -189,9 +194,10 @@ impl Trained {
         for chunk in points.chunks(CARRIED_AT_A_TIME) {
             let start = normalised(frame, chunk);
             let end = self.learned.carry(&start, from, to)?;
-            moved.extend((chunk.iter().zip(start.iter().zip(&end))).map(|(x, (start, end))| {
-                frame.displaced(*x, *start, *end)
-            }));
+            moved.extend(
+                (chunk.iter().zip(start.iter().zip(&end)))
+                    .map(|(x, (start, end))| frame.displaced(*x, *start, *end)),
+            );
             progress(moved.len());
         }
         Ok(moved)
@@ -227,7 +233,9 @@ impl Trained {
         let values = field.values(&points, t).into_iter();
         let gradients = field.gradients(&points, t).into_iter();
         Ok(Distances {
-            distances: values.map(|value| frame.invert_length(f64::from(value))).collect(),
+            distances: values
+                .map(|value| frame.invert_length(f64::from(value)))
+                .collect(),
             gradients: gradients.map(|g| g.map(f64::from)).collect(),
         })
     }

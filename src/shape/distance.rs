@@ -30,7 +30,7 @@ const LEVELS: usize = 1000;
 
 /// Points with normals, arranged for distance queries.
 #[derive(Debug)]
-pub struct SignedDistance {
+pub(super) struct SignedDistance {
     search: NeighbourSearch,
     points: Vec<[f64; 3]>,
     normals: Vec<[f32; 3]>,
@@ -46,7 +46,7 @@ impl SignedDistance {
     ///
     /// # Panics
     /// If there are no points, or not as many normals.
-    pub fn new(points: &[[f32; 3]], normals: &[[f32; 3]]) -> Self {
+    pub(super) fn new(points: &[[f32; 3]], normals: &[[f32; 3]]) -> Self {
         assert_eq!(points.len(), normals.len(), "one normal per point");
         let points: Vec<[f64; 3]> = points.iter().map(|point| point.map(f64::from)).collect();
         let search = NeighbourSearch::new(&points);
@@ -76,7 +76,7 @@ impl SignedDistance {
     }
 
     /// The signed distance of `x` from the surface.
-    pub fn at(&self, x: [f32; 3]) -> f32 {
+    pub(super) fn at(&self, x: [f32; 3]) -> f32 {
         let x = x.map(f64::from);
         let nearest = self.search.nearest(x, PLANES);
         let reach = self.close * self.close;

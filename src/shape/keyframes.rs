@@ -23,7 +23,7 @@ use crate::geometry::{Bounds, EdgeSharing, NeighbourSearch};
 
 /// Where correspondences come from.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum CorrespondenceSource {
+pub(crate) enum CorrespondenceSource {
     /// A two-column file of vertex indices.
     File(PathBuf),
     /// Vertex i of the source corresponds to vertex i of the target.
@@ -36,7 +36,7 @@ pub enum CorrespondenceSource {
 
 /// Where normals come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum NormalSource {
+pub(crate) enum NormalSource {
     /// The faces of a mesh, turned outwards; a cloud's own, or estimated if it has none.
     Auto,
     /// As the file gives them: faces as they are wound, normals of a cloud; an error without.
@@ -49,7 +49,7 @@ pub enum NormalSource {
 
 /// What to make of which shapes: the data section of a recipe.
 #[derive(Debug, Clone, PartialEq)]
-pub struct DataOptions {
+pub(crate) struct DataOptions {
     /// The times of the key frames, ascending from 0 to 1; at least two.
     pub times: Vec<f64>,
     /// Where pairs of corresponding points come from: entry `k` from key frame `k` to the one after it.
@@ -190,7 +190,7 @@ impl Draw {
 ///
 /// # Panics
 /// If there is not one shape for each time, or not one source of correspondences between each two.
-pub fn prepare(shapes: &[Shape], options: &DataOptions) -> Result<Keyframes, ShapeError> {
+pub(crate) fn prepare(shapes: &[Shape], options: &DataOptions) -> Result<Keyframes, ShapeError> {
     assert_eq!(shapes.len(), options.times.len(), "a shape for each time");
     assert_eq!(shapes.len(), options.between.len() + 1, "a source between");
     if options.points < FEWEST_POINTS {

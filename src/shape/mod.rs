@@ -21,13 +21,12 @@ mod normalise;
 mod normals;
 mod sample;
 
-pub use crate::formats::{FEWEST_POINTS, Shape, ShapeError};
-pub use crate::geometry::{Bounds, NeighbourSearch};
-pub use correspond::Correspondences;
-pub use normalise::Normalisation;
-pub use normals::estimate_normals;
+pub(crate) use crate::formats::{FEWEST_POINTS, Shape, ShapeError};
+pub(crate) use crate::geometry::{Bounds, NeighbourSearch};
+pub(crate) use correspond::Correspondences;
 pub(crate) use keyframes::points_of;
-pub use keyframes::{
-    CorrespondenceSource, DataOptions, Keyframe, Keyframes, NormalSource, PointCloud, prepare,
-};
-pub use sample::{SurfaceSamples, sample_surface};
+pub(crate) use keyframes::{CorrespondenceSource, DataOptions, NormalSource, prepare};
+pub use keyframes::{Keyframe, Keyframes, PointCloud};
+pub(crate) use normalise::Normalisation;
+pub(crate) use normals::estimate_normals;
+pub(crate) use sample::{SurfaceSamples, sample_surface};

@@ -34,7 +34,7 @@ const NOISE: f64 = 4.0;
 
 /// What is known of the normals of a raw cloud.
 #[derive(Debug, Clone, PartialEq)]
-pub struct EstimatedNormals {
+pub(crate) struct EstimatedNormals {
     /// Unit normals of the points, consistent and outward.
     pub normals: Vec<[f32; 3]>,
     /// How clearly the cloud as a whole tells that this side is out, from 1 (surely) over 0 (not at
@@ -46,7 +46,7 @@ pub struct EstimatedNormals {
 ///
 /// # Panics
 /// If there are no points.
-pub fn estimate_normals(points: &[[f64; 3]]) -> EstimatedNormals {
+pub(crate) fn estimate_normals(points: &[[f64; 3]]) -> EstimatedNormals {
     let neighbours = NeighbourSearch::new(points).nearest_of_each(points, NEIGHBOURS);
     let fit = |found: &Vec<Neighbour>| {
         let (normal, variance) = tangent_plane(points, found);

@@ -11,7 +11,7 @@ use crate::geometry::linear::{length, unit};
 
 /// Points on a surface and where on it they are; all lists have the same length.
 #[derive(Debug, Clone, PartialEq)]
-pub struct SurfaceSamples {
+pub(crate) struct SurfaceSamples {
     /// Positions, in the coordinates of the mesh.
     pub points: Vec<[f64; 3]>,
     /// Unit normals of the triangles that they lie on.
@@ -29,7 +29,7 @@ pub struct SurfaceSamples {
 ///
 /// # Panics
 /// If the mesh has no area, or indices out of range: a [`Shape`](crate::formats::Shape) that was read has neither.
-pub fn sample_surface(mesh: &Mesh<f64>, count: usize, rng: &mut impl Rng) -> SurfaceSamples {
+pub(crate) fn sample_surface(mesh: &Mesh<f64>, count: usize, rng: &mut impl Rng) -> SurfaceSamples {
     let triangles = &mesh.triangles;
     let mut total = 0.0;
     let mut running = Vec::with_capacity(triangles.len());

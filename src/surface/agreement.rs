@@ -10,7 +10,7 @@ const LOOKED_AT: usize = 1000;
 
 /// How the surface of one time and the motion agree; lengths in normalised units.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Agreement {
+pub(crate) struct Agreement {
     /// The mean of `|f(phi_{t -> s}(x), s)|` over points `x` of the surface at `t`, for `s` 0 and 1: how far
     /// the surface is from those of the ends carried to its time, 0 where the motion carries one onto the
     /// other. Only as far as `f` is a distance.
@@ -75,9 +75,8 @@ mod tests {
     impl SurfaceField for Ball {
         fn values(&self, points: &[[f32; 3]], time: f64) -> Vec<f32> {
             let centre = (self.speed * time) as f32;
-            let value = |[x, y, z]: &[f32; 3]| {
-                ((x - centre).powi(2) + y.powi(2) + z.powi(2)).sqrt() - 0.4
-            };
+            let value =
+                |[x, y, z]: &[f32; 3]| ((x - centre).powi(2) + y.powi(2) + z.powi(2)).sqrt() - 0.4;
             points.iter().map(value).collect()
         }
 

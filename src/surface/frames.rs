@@ -19,7 +19,7 @@ use crate::geometry::Mesh;
 
 /// What to write.
 #[derive(Clone, Debug, PartialEq)]
-pub struct FrameOptions {
+pub(crate) struct FrameOptions {
     /// The times, in `[0, 1]`, in the order of the files.
     pub times: Vec<f64>,
     /// Cells along the longest side of the box.
@@ -36,7 +36,7 @@ pub struct FrameOptions {
 
 /// One entry of `frames.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct FrameEntry {
+pub(crate) struct FrameEntry {
     /// The time, 0 to 1.
     pub time: f64,
     /// The surface's file, relative to `frames.json`.
@@ -70,7 +70,7 @@ impl FrameEntry {
 
 /// A surface that has been written.
 #[derive(Clone, Debug)]
-pub struct Frame {
+pub(crate) struct Frame {
     /// Its entry in `frames.json`.
     pub entry: FrameEntry,
     /// The surface in normalised coordinates.
@@ -89,7 +89,7 @@ pub struct Frame {
 ///
 /// # Errors
 /// [`FramesError`]. `frames.json` is removed first and written last, so a folder with one is complete.
-pub fn write_frames(
+pub(crate) fn write_frames(
     learned: &Learned,
     options: &FrameOptions,
     mut done: impl FnMut(&Frame) -> io::Result<bool>,

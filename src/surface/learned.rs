@@ -14,7 +14,7 @@ use crate::shape::{Bounds, Normalisation};
 const CHECKED: usize = 1000;
 
 /// What was learned and the frame that it lives in.
-pub struct Learned {
+pub(crate) struct Learned {
     /// The field and the motion, each if the method has one.
     pub deformation: Box<dyn Deformation>,
     /// A mesh at time 0, normalised, that the motion carries: of methods that have no field.
@@ -27,7 +27,7 @@ pub struct Learned {
 
 /// A surface found at a time.
 #[derive(Clone, Debug)]
-pub struct Found {
+pub(crate) struct Found {
     /// In normalised coordinates.
     pub mesh: Mesh<f32>,
     /// Its connected pieces.
@@ -44,7 +44,7 @@ impl Learned {
     ///
     /// # Errors
     /// [`FramesError`] if the field is not finite there, or has too many cells; [`FramesError::NoMotion`].
-    pub fn surface_at(
+    pub(crate) fn surface_at(
         &self,
         grid: &Grid,
         time: f64,
@@ -99,7 +99,7 @@ impl Learned {
     }
 
     /// The mean of `||grad f| - 1|` at points, normalised; `None` without a field.
-    pub fn slope_error(&self, points: &[[f32; 3]], time: f64) -> Option<f64> {
+    pub(crate) fn slope_error(&self, points: &[[f32; 3]], time: f64) -> Option<f64> {
         let field = self.deformation.field()?;
         Some(mean_slope_error(&field.gradients(points, time)))
     }
@@ -108,7 +108,7 @@ impl Learned {
     ///
     /// # Errors
     /// [`FramesError::NoMotion`] if the method moves no points.
-    pub fn motion(&self) -> Result<&dyn PointMotion, FramesError> {
+    pub(crate) fn motion(&self) -> Result<&dyn PointMotion, FramesError> {
         self.deformation.motion().ok_or_else(no_motion)
     }
 
@@ -116,7 +116,7 @@ impl Learned {
     ///
     /// # Errors
     /// [`FramesError::NoMotion`] if the method moves no points.
-    pub fn carry(
+    pub(crate) fn carry(
         &self,
         points: &[[f32; 3]],
         from: f64,
@@ -126,7 +126,7 @@ impl Learned {
     }
 
     /// Whether the surface moves with the motion by what it is, not by what was learned.
-    pub fn surface_is_carried(&self) -> bool {
+    pub(crate) fn surface_is_carried(&self) -> bool {
         let moves = self.deformation.motion().is_some();
         match self.deformation.field() {
             Some(field) => field.carried().is_some() && moves,
@@ -138,7 +138,7 @@ impl Learned {
     ///
     /// # Errors
     /// [`FramesError::NoMotion`] if the method moves no points.
-    pub fn path(
+    pub(crate) fn path(
         &self,
         start: &[[f32; 3]],
         times: &[f64],
@@ -214,7 +214,7 @@ pub(crate) mod testing {
     use super::*;
 
     /// A field and a motion given by the test.
-    pub struct Given<F, M> {
+    pub(crate) struct Given<F, M> {
         pub field: Option<F>,
         pub motion: Option<M>,
     }
@@ -231,7 +231,7 @@ pub(crate) mod testing {
     }
 
     /// Nothing moves.
-    pub struct Still;
+    pub(crate) struct Still;
 
     impl PointMotion for Still {
         fn carry(&self, points: &[[f32; 3]], _: f64, _: f64) -> Vec<[f32; 3]> {
@@ -250,7 +250,7 @@ pub(crate) mod testing {
     impl Learned {
         /// A field in a box of half-width 0.7 about the origin, in coordinates of its own; no piece is left
         /// out.
-        pub fn of_field(field: impl SurfaceField + Send + 'static) -> Self {
+        pub(crate) fn of_field(field: impl SurfaceField + Send + 'static) -> Self {
             Self::of(Given {
                 field: Some(field),
                 motion: None::<Still>,
@@ -258,7 +258,7 @@ pub(crate) mod testing {
         }
 
         /// The same of a field and a motion.
-        pub fn of(deformation: impl Deformation + 'static) -> Self {
+        pub(crate) fn of(deformation: impl Deformation + 'static) -> Self {
             Self {
                 deformation: Box::new(deformation),
                 template: None,

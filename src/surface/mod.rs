@@ -13,7 +13,7 @@
 mod agreement;
 mod error;
 mod flow_map;
-pub mod frames;
-pub mod learned;
+pub(crate) mod frames;
+pub(crate) mod learned;
 
-pub use error::FramesError;
+pub(crate) use error::FramesError;

@@ -176,7 +176,7 @@ impl<B: TrainBackend, M: MethodSet> On<B, M> {
             Tensor::<B::InnerBackend, 1>::ones([1], &self.device).into_data();
         }));
         std::panic::set_hook(hook);
-        opened.map_err(|_| {
+        opened.map_err(|_panic| {
             let problem = first.lock().ok().and_then(|mut first| first.take());
             DeviceError::None(problem.unwrap_or_default())
         })

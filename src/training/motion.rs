@@ -3,8 +3,8 @@
 
 use burn::module::AutodiffModule;
 use burn::tensor::Tensor;
-use isomorph_model::loss::{divergence, matching, screw, smoothness, strain};
 use isomorph_model::flow::transport::transport;
+use isomorph_model::loss::{divergence, matching, screw, smoothness, strain};
 use isomorph_model::operators::{Operators, VelocityJet, VelocityRequest};
 use isomorph_model::trajectory::integrate;
 use isomorph_model::{Objective, TrainBackend, VelocityNet};

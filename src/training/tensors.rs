@@ -4,7 +4,10 @@ use burn::tensor::backend::Backend;
 use burn::tensor::{Tensor, TensorData};
 
 /// Points as a tensor `[n, 3]`.
-pub(crate) fn rows<B: Backend, const N: usize>(points: &[[f32; N]], device: &B::Device) -> Tensor<B, 2> {
+pub(crate) fn rows<B: Backend, const N: usize>(
+    points: &[[f32; N]],
+    device: &B::Device,
+) -> Tensor<B, 2> {
     let data = TensorData::new(points.as_flattened().to_vec(), [points.len(), N]);
     Tensor::from_data(data, device)
 }

@@ -190,7 +190,7 @@ fn results_go_to_standard_output_and_all_else_to_standard_error() {
     assert!(
         ended
             .stderr
-            .contains("2,000 points, 2,000 on the key frames"),
+            .contains("key frames of 2,000 and 2,000 points"),
         "{ended:?}"
     );
     assert!(

@@ -6,7 +6,10 @@
 //! | [`without_denormals`] | a register of the processor decides what becomes of numbers below 1e-38 | a fifth of a step at 8 layers, four fifths at 12 |
 //!
 //! `model/benches/README.md` has the measurements.
-#![allow(unsafe_code)]
+#![allow(
+    unsafe_code,
+    reason = "the one place that talks to the processor and to gemm: see above"
+)]
 
 /// Runs `job` with numbers too small for a normal `f32`, below 1.2e-38, taken for 0 on this thread.
 ///

@@ -15,7 +15,7 @@ pub(crate) use crate::nets::implicit_net::directions;
 use crate::objective::Objective;
 
 /// A network small enough to be trained within a second, softplus of sharpness `beta`.
-pub fn small(beta: f64) -> ImplicitNetConfig {
+pub(crate) fn small(beta: f64) -> ImplicitNetConfig {
     ImplicitNetConfig {
         depth: 2,
         width: 24,
@@ -27,7 +27,7 @@ pub fn small(beta: f64) -> ImplicitNetConfig {
 }
 
 /// As [`small`], of sines.
-pub fn small_siren(omega: f64) -> ImplicitNetConfig {
+pub(crate) fn small_siren(omega: f64) -> ImplicitNetConfig {
     ImplicitNetConfig {
         activation: Activation::Sine { omega },
         ..small(1.0)
@@ -35,7 +35,7 @@ pub fn small_siren(omega: f64) -> ImplicitNetConfig {
 }
 
 /// All five terms.
-pub fn end_weights() -> EndWeights {
+pub(crate) fn end_weights() -> EndWeights {
     EndWeights {
         data: 1.0,
         normals: 0.1,
@@ -46,7 +46,7 @@ pub fn end_weights() -> EndWeights {
 }
 
 /// `count` samples on each of two spheres around the origin, and as many in space around them.
-pub fn spheres<B: Backend>(count: usize, radii: [f64; 2]) -> EndSamples<B> {
+pub(crate) fn spheres<B: Backend>(count: usize, radii: [f64; 2]) -> EndSamples<B> {
     let lattice = directions(count);
     let scaled = |by: &dyn Fn(usize) -> f64| -> Vec<[f64; 3]> {
         let point = |(k, d): (usize, &[f64; 3])| d.map(|c| c * by(k));
@@ -68,7 +68,7 @@ pub fn spheres<B: Backend>(count: usize, radii: [f64; 2]) -> EndSamples<B> {
 }
 
 /// The mean distance from the origin at which `f(., t)` first turns positive.
-pub fn radius<B: ModelBackend>(geometry: &impl Geometry<B>, t: f64) -> f64 {
+pub(crate) fn radius<B: ModelBackend>(geometry: &impl Geometry<B>, t: f64) -> f64 {
     let (lattice, shells, step) = (directions(24), 80, 0.01);
     let sum: f64 = lattice
         .iter()
@@ -91,7 +91,7 @@ pub fn radius<B: ModelBackend>(geometry: &impl Geometry<B>, t: f64) -> f64 {
 }
 
 /// The network after some steps of Adam down the objective.
-pub fn trained<B: TrainBackend, M: AutodiffModule<B>>(
+pub(crate) fn trained<B: TrainBackend, M: AutodiffModule<B>>(
     net: M,
     steps: usize,
     rate: f64,
@@ -110,7 +110,7 @@ pub fn trained<B: TrainBackend, M: AutodiffModule<B>>(
 }
 
 /// The slope of each term along its own gradient by the weights is the gradient's length, and not 0.
-pub fn check_gradients<B: TrainBackend, M: AutodiffModule<B>>(
+pub(crate) fn check_gradients<B: TrainBackend, M: AutodiffModule<B>>(
     net: &M,
     objective: impl Fn(&M) -> Objective<B>,
 ) {

@@ -1,7 +1,7 @@
 //! What the tests of this crate share: the backends they run on, and the way in and out of tensors.
 
 mod folders;
-pub mod learning;
+pub(crate) mod learning;
 
 use burn::module::{Module, ModuleMapper, Param};
 use burn::tensor::{Tensor, TensorData, backend::Backend};
@@ -9,12 +9,12 @@ use burn_autodiff::Autodiff;
 use burn_ndarray::NdArray;
 
 /// Values only.
-pub type Plain = NdArray;
+pub(crate) type Plain = NdArray;
 /// What training runs on.
-pub type Train = Autodiff<NdArray>;
+pub(crate) type Train = Autodiff<NdArray>;
 
 /// Points as a tensor `[n, 3]`.
-pub fn points<B: Backend>(points: &[[f64; 3]]) -> Tensor<B, 2> {
+pub(crate) fn points<B: Backend>(points: &[[f64; 3]]) -> Tensor<B, 2> {
     let flat: Vec<f64> = points.iter().flatten().copied().collect();
     Tensor::from_data(
         TensorData::new(flat, [points.len(), 3]),
@@ -23,7 +23,7 @@ pub fn points<B: Backend>(points: &[[f64; 3]]) -> Tensor<B, 2> {
 }
 
 /// Values as a tensor `[n, 1]`.
-pub fn column<B: Backend>(values: &[f64]) -> Tensor<B, 2> {
+pub(crate) fn column<B: Backend>(values: &[f64]) -> Tensor<B, 2> {
     Tensor::from_data(
         TensorData::new(values.to_vec(), [values.len(), 1]),
         &Default::default(),
@@ -31,7 +31,7 @@ pub fn column<B: Backend>(values: &[f64]) -> Tensor<B, 2> {
 }
 
 /// The elements of a tensor, row by row.
-pub fn host<B: Backend, const D: usize>(tensor: Tensor<B, D>) -> Vec<f64> {
+pub(crate) fn host<B: Backend, const D: usize>(tensor: Tensor<B, D>) -> Vec<f64> {
     tensor
         .into_data()
         .convert::<f64>()
@@ -40,7 +40,7 @@ pub fn host<B: Backend, const D: usize>(tensor: Tensor<B, D>) -> Vec<f64> {
 }
 
 /// Moves every weight by up to `by`, so that none that starts at zero hides a mistake.
-pub fn shaken<B: Backend, M: Module<B>>(net: M, by: f64) -> M {
+pub(crate) fn shaken<B: Backend, M: Module<B>>(net: M, by: f64) -> M {
     struct Shake {
         by: f64,
         count: f64,
@@ -62,7 +62,7 @@ pub fn shaken<B: Backend, M: Module<B>>(net: M, by: f64) -> M {
 }
 
 /// Numbers between -1 and 1, the same for the same seed, `[rows, columns]`.
-pub fn numbers<B: Backend>(rows: usize, columns: usize, seed: f32) -> Tensor<B, 2> {
+pub(crate) fn numbers<B: Backend>(rows: usize, columns: usize, seed: f32) -> Tensor<B, 2> {
     let values = (0..rows * columns).map(|k| (seed + 1.7 * k as f32).sin());
     let data = TensorData::new(values.collect::<Vec<f32>>(), [rows, columns]);
     Tensor::from_data(data, &Default::default())
@@ -70,7 +70,7 @@ pub fn numbers<B: Backend>(rows: usize, columns: usize, seed: f32) -> Tensor<B, 
 
 /// Fails unless both have as many numbers, each within the tolerance of the other.
 #[track_caller]
-pub fn assert_close(a: Vec<f64>, b: Vec<f64>, tolerance: f64, label: &str) {
+pub(crate) fn assert_close(a: Vec<f64>, b: Vec<f64>, tolerance: f64, label: &str) {
     assert_eq!(a.len(), b.len(), "{label}");
     for (a, b) in a.iter().zip(b) {
         assert!((a - b).abs() <= tolerance, "{label}: {a} and {b}");

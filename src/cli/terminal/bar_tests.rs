@@ -1,8 +1,8 @@
 //! What the bar draws, on a screen that only takes notes.
 
 use super::*;
-use isomorph::event::{Phase, StepReport, TermReport};
 use indicatif::TermLike;
+use isomorph::event::{Phase, StepReport, TermReport};
 use std::io;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -88,8 +88,7 @@ fn started(first_step: usize) -> Event {
         steps: 4000,
         first_step,
         networks: vec![("f", 1), ("V", 1)],
-        source_points: 1,
-        target_points: 1,
+        points: vec![1, 1],
         correspondences: 0,
     }
 }

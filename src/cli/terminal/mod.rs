@@ -19,7 +19,7 @@ use plain::PlainLines;
 
 /// Standard error, as far as the events of a run go.
 #[derive(Debug)]
-pub struct Terminal(View);
+pub(super) struct Terminal(View);
 
 #[derive(Debug)]
 enum View {
@@ -30,7 +30,7 @@ enum View {
 
 impl Terminal {
     /// Looks at the environment and chooses how to show the run in this folder.
-    pub fn new(run: &Path, quiet: bool) -> Self {
+    pub(super) fn new(run: &Path, quiet: bool) -> Self {
         let redraws = redraws(io::stderr().is_terminal(), |name| std::env::var_os(name));
         Self(match quiet {
             true => View::Nothing,
@@ -44,7 +44,7 @@ impl Terminal {
     }
 
     /// Shows an event. A terminal that has gone away is ignored.
-    pub fn show(&mut self, event: &Event) {
+    pub(super) fn show(&mut self, event: &Event) {
         let now = Instant::now();
         match &mut self.0 {
             View::Nothing => {}

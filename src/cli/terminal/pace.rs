@@ -92,8 +92,7 @@ mod tests {
             steps,
             first_step,
             networks: vec![("f", 1), ("V", 1)],
-            source_points: 1,
-            target_points: 1,
+            points: vec![1, 1],
             correspondences: 0,
         }
     }

@@ -4,8 +4,8 @@ use std::io::Write;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use super::told;
 use super::pace::Pace;
+use super::told;
 use isomorph::event::{Event, StepReport};
 
 /// Steps are shown at most this often.
@@ -123,8 +123,7 @@ mod tests {
             steps: 400,
             first_step: 99,
             networks: vec![("f", 2), ("V", 2)],
-            source_points: 2,
-            target_points: 2,
+            points: vec![2, 2],
             correspondences: 0,
         };
         let entered = Event::PhaseEntered {

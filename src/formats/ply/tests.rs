@@ -7,14 +7,14 @@ use crate::formats;
 
 /// What a writer may choose.
 #[derive(Debug, Clone, Copy)]
-pub enum Kind {
+pub(crate) enum Kind {
     Ascii,
     Little,
     Big,
 }
 
 /// A pyramid: four triangles over a quad, with normals, a colour and an element of no use to us.
-pub fn pyramid(kind: Kind) -> Vec<u8> {
+pub(crate) fn pyramid(kind: Kind) -> Vec<u8> {
     let format = match kind {
         Kind::Ascii => "ascii",
         Kind::Little => "binary_little_endian",
@@ -76,7 +76,7 @@ pub fn pyramid(kind: Kind) -> Vec<u8> {
     bytes
 }
 
-pub fn read_bytes(bytes: &[u8]) -> Result<Shape, ShapeError> {
+pub(crate) fn read_bytes(bytes: &[u8]) -> Result<Shape, ShapeError> {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("shape.ply");
     std::fs::write(&path, bytes).expect("written");

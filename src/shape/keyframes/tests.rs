@@ -129,10 +129,7 @@ fn pairs_from_a_file_are_used_up_to_the_fraction() {
     assert_eq!((round(from), round(to)), ([1.0, 0.0, 0.0], [0.0, 0.0, 2.0]));
     assert_eq!(pair.between[0].len(), 3);
     files.options.correspondence_fraction = 0.002;
-    assert_eq!(
-        files.prepared().between[0].len(),
-        2
-    );
+    assert_eq!(files.prepared().between[0].len(), 2);
     for fraction in [0.0, -1.0, f64::NAN] {
         files.options.correspondence_fraction = fraction;
         let text = files.prepare().expect_err("none left").to_string();
@@ -142,17 +139,13 @@ fn pairs_from_a_file_are_used_up_to_the_fraction() {
         );
     }
     files.options.between = vec![CorrespondenceSource::None];
-    assert!(
-        files.prepared()
-            .between[0]
-            .is_empty()
-    );
+    assert!(files.prepared().between[0].is_empty());
 }
 
 #[test]
 fn a_mesh_wound_inwards_has_its_normals_flipped_unless_told_not_to() {
     let mut files = tetrahedra();
-    let outward = files.prepared().keys[0].cloud.normals;
+    let outward = files.prepared().keys[0].cloud.normals.clone();
     write_tetrahedron(&files.source, 1.0, true, 4);
     let pair = files.prepared();
     assert_eq!(pair.notes.len(), 1);
@@ -168,7 +161,10 @@ fn a_mesh_wound_inwards_has_its_normals_flipped_unless_told_not_to() {
             .filter(|normal| normal.iter().any(|&x| x > 0.01) != (normal[0] > 0.5))
             .count()
     };
-    assert_eq!([inside(&outward), inside(&pair.keys[0].cloud.normals)], [0, 0]);
+    assert_eq!(
+        [inside(&outward), inside(&pair.keys[0].cloud.normals)],
+        [0, 0]
+    );
     files.options.normals = NormalSource::Given;
     let given = files.prepared();
     assert!(inside(&given.keys[0].cloud.normals) > 0, "as wound");
@@ -227,7 +223,10 @@ fn a_cloud_is_used_as_it_is_with_its_own_normals_or_estimated_ones() {
             .filter(|(p, n)| p.iter().zip(*n).map(|(p, n)| p * n).sum::<f32>() > 0.0)
             .count()
     };
-    assert_eq!([outward(&pair.keys[0].cloud), outward(&pair.keys[1].cloud)], [0, 500]);
+    assert_eq!(
+        [outward(&pair.keys[0].cloud), outward(&pair.keys[1].cloud)],
+        [0, 500]
+    );
     files.options.normals = NormalSource::Given;
     let text = files.prepare().expect_err("no normals").to_string();
     assert!(
@@ -236,14 +235,22 @@ fn a_cloud_is_used_as_it_is_with_its_own_normals_or_estimated_ones() {
     );
     files.options.normals = NormalSource::Estimate;
     let pair = files.prepared();
-    assert_eq!([outward(&pair.keys[0].cloud), outward(&pair.keys[1].cloud)], [500, 500]);
+    assert_eq!(
+        [outward(&pair.keys[0].cloud), outward(&pair.keys[1].cloud)],
+        [500, 500]
+    );
 }
 
 #[test]
 fn the_bounds_hold_every_point_of_both() {
     let mut files = tetrahedra();
     let pair = files.prepared();
-    for point in pair.keys[0].cloud.points.iter().chain(&pair.keys[1].cloud.points) {
+    for point in pair.keys[0]
+        .cloud
+        .points
+        .iter()
+        .chain(&pair.keys[1].cloud.points)
+    {
         assert_eq!(pair.bounds.union(&Bounds::of(&[*point])), pair.bounds);
     }
     // And no more: half of a box this size would not.
@@ -256,7 +263,8 @@ fn the_bounds_hold_every_point_of_both() {
 #[test]
 fn three_key_frames_have_pairs_between_each_two_and_samples_of_their_own() {
     let files = tetrahedra();
-    let shapes = [&files.source, &files.target, &files.source].map(|path| crate::formats::read(path));
+    let shapes =
+        [&files.source, &files.target, &files.source].map(|path| crate::formats::read(path));
     let shapes = shapes.map(|shape| shape.expect("a shape"));
     let options = DataOptions {
         times: vec![0.0, 0.25, 1.0],
@@ -273,6 +281,9 @@ fn three_key_frames_have_pairs_between_each_two_and_samples_of_their_own() {
     let [first, .., last] = &three.keys[..] else {
         panic!("three key frames")
     };
-    assert_ne!(first.cloud.points, last.cloud.points, "one shape, drawn anew");
+    assert_ne!(
+        first.cloud.points, last.cloud.points,
+        "one shape, drawn anew"
+    );
     assert_eq!(three.training_data().keys.len(), 3);
 }

@@ -26,7 +26,7 @@ const STEPS: usize = 10;
 ///
 /// `areas` are those that the points stand for, `softening` the squares of the lengths below which
 /// their places say nothing: spacing and noise.
-pub fn outward(
+pub(super) fn outward(
     points: &[[f64; 3]],
     normals: &[[f64; 3]],
     areas: &[f64],

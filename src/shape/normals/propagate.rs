@@ -25,7 +25,7 @@ struct Link {
 
 /// The signs, 1 or -1, under which the unit normals agree with their neighbours' and, part by part,
 /// with the evidence: 1 where a normal as given surely points out, -1 where it surely points in.
-pub fn signs(
+pub(super) fn signs(
     points: &[[f64; 3]],
     normals: &[[f64; 3]],
     neighbours: &[Vec<Neighbour>],

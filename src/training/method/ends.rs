@@ -5,9 +5,9 @@ use std::ops::Range;
 
 use burn::module::AutodiffModule;
 use isomorph_model::baseline::blend::{SdfBlend, SdfBlendConfig};
-use isomorph_model::flow::end_terms::EndSamples;
 use isomorph_model::baseline::lipmlp::{LipMlp, LipMlpConfig};
 use isomorph_model::baseline::mlp::{PlainMlp, PlainMlpConfig};
+use isomorph_model::flow::end_terms::EndSamples;
 use isomorph_model::{Geometry, Motion, Objective, TrainBackend};
 
 use super::spec::{Acts, Keys, MethodSpec, Needs};

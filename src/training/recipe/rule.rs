@@ -228,7 +228,7 @@ impl Rule {
                     .iter()
                     .map(|item| {
                         self.number_within(item.get_ref(), range)
-                            .map_err(|_| self.allowed())
+                            .map_err(|_allowed_for_one| self.allowed())
                     })
                     .collect::<Result<_, _>>()
                     .map(Value::Numbers),

@@ -89,6 +89,7 @@ macro_rules! section {
         }
     ) => {
         $(#[doc = $about])+
+        #[allow(unreachable_pub, reason = "the sections of one method alone are of this crate")]
         #[derive(Debug, Clone, PartialEq)]
         pub struct $Section {
             $(

@@ -55,7 +55,12 @@ macro_rules! with {
 
 /// What leaves the activation, of the shape of `z`, and its slope, `[n, c]`, from what enters it, `z`,
 /// `[blocks n, c]`, without the bias, `[c]`.
-pub(super) fn jet(z: &[f32], bias: &[f32], lanes: Lanes, activation: Activation) -> (Vec<f32>, Vec<f32>) {
+pub(super) fn jet(
+    z: &[f32],
+    bias: &[f32],
+    lanes: Lanes,
+    activation: Activation,
+) -> (Vec<f32>, Vec<f32>) {
     with!(activation, jet_of(z, bias, lanes))
 }
 

@@ -51,7 +51,12 @@ pub(super) struct Block<B: Backend> {
 
 impl<B: ModelBackend> Block<B> {
     /// A block near the identity, its parameters numbered from `first + 1`.
-    pub(super) fn init(config: &NfgpConfig, first: u64, rng: &mut ChaCha8Rng, device: &B::Device) -> Self {
+    pub(super) fn init(
+        config: &NfgpConfig,
+        first: u64,
+        rng: &mut ChaCha8Rng,
+        device: &B::Device,
+    ) -> Self {
         let parameter = |id: u64, values: Vec<f32>, shape: [usize; 2]| {
             let tensor = Tensor::from_data(TensorData::new(values, shape), device);
             // Numbered, so that a checkpoint depends on nothing but the seed.
