@@ -20,12 +20,12 @@ MOVING = ("eigenbasis", "nfgp")
 
 
 def declared() -> set[str]:
-    """All keys as `section.key`, from the file that declares the sections of a recipe."""
+    """All keys as `section.key`, from the files that declare the sections of a recipe."""
     found = set()
-    for path in SOURCE.rglob("recipe/**/*.rs"):
+    for path in [*SOURCE.rglob("recipe/*.rs"), *SOURCE.rglob("method/*.rs")]:
         section = None
         for line in path.read_text("utf-8").splitlines():
-            opened = re.match(r"\s*(\w+): \w+Recipe \{", line)
+            opened = re.match(r"\s*(?:pub )?(\w+): \w+(?:Recipe|Keys) \{", line)
             key = re.match(r"\s+(\w+): [^=]+=(?!=)", line)
             if opened:
                 section = opened.group(1).replace("_", "-")
