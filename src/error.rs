@@ -1,25 +1,8 @@
 //! What can go wrong, as one type: a sentence for people, and a kind that decides what a program does next.
 //!
-//! Every error inside the library becomes an [`Error`] here, and here alone its kind is decided.
+//! Every error inside the library becomes an [`Error`] in `kinds.rs`, where alone its kind is decided.
 
 use std::fmt;
-use std::io;
-
-use isomorph_training::engine::NotHere;
-
-use crate::backend::BackendError;
-use crate::charts::ChartError;
-use crate::compare::{DigestError, PlanError, ReportError, StoreError};
-use crate::cubes::GridError;
-use crate::evaluate::TruthError;
-use crate::formats::{ShapeError, WriteError};
-use crate::matching::MatchError;
-use crate::recipe::RecipeError;
-use crate::session::checkpoint::CheckpointError;
-use crate::session::folder::FolderError;
-use crate::session::learner::LearnerError;
-use crate::session::metrics::MetricsError;
-use crate::surface::FramesError;
 
 /// What kind of thing went wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -98,7 +81,11 @@ impl Error {
         }
     }
 
-    fn of(kind: ErrorKind, error: impl std::error::Error + Send + Sync + 'static) -> Self {
+    /// An error of this kind with its cause.
+    pub(crate) fn of(
+        kind: ErrorKind,
+        error: impl std::error::Error + Send + Sync + 'static,
+    ) -> Self {
         Self {
             kind,
             message: error.to_string(),
@@ -120,64 +107,6 @@ impl std::error::Error for Error {
     }
 }
 
-/// Each inner error with the rule for its kind.
-macro_rules! kinds {
-    ($($Inner:ty: $kind:expr;)+) => { $(
-        impl From<$Inner> for Error {
-            fn from(error: $Inner) -> Self {
-                let kind: fn(&$Inner) -> ErrorKind = $kind;
-                Self::of(kind(&error), error)
-            }
-        }
-    )+ };
-}
-
-kinds! {
-    RecipeError: |_| ErrorKind::Usage;
-    PlanError: |_| ErrorKind::Usage;
-    GridError: |_| ErrorKind::Usage;
-    NotHere: |_| ErrorKind::Usage;
-    ShapeError: |_| ErrorKind::Input;
-    WriteError: |_| ErrorKind::Failure;
-    StoreError: |_| ErrorKind::Failure;
-    DigestError: |_| ErrorKind::Failure;
-    ReportError: |_| ErrorKind::Failure;
-    io::Error: |_| ErrorKind::Failure;
-    serde_json::Error: |_| ErrorKind::Failure;
-    fmt::Error: |_| ErrorKind::Failure;
-    ChartError: |_| ErrorKind::Failure;
-    BackendError: |error| match error {
-        BackendError::Absent(_) | BackendError::Device { .. } => ErrorKind::Usage,
-        BackendError::NoDevice { .. } => ErrorKind::Failure,
-    };
-    LearnerError: |error| match error {
-        LearnerError::Missing(_) | LearnerError::NotHere(_) => ErrorKind::Usage,
-        _ => ErrorKind::Failure,
-    };
-    MatchError: |error| match error {
-        MatchError::Option { .. } => ErrorKind::Usage,
-        _ => ErrorKind::Input,
-    };
-    TruthError: |error| match error {
-        TruthError::Span { .. } | TruthError::Option { .. } => ErrorKind::Usage,
-        _ => ErrorKind::Input,
-    };
-    CheckpointError: |error| match error {
-        CheckpointError::Io { .. } => ErrorKind::Failure,
-        _ => ErrorKind::Input,
-    };
-    MetricsError: |_| ErrorKind::Input;
-    FolderError: |error| match error {
-        FolderError::Io { .. } => ErrorKind::Failure,
-        _ => ErrorKind::Usage,
-    };
-    FramesError: |error| match error {
-        FramesError::Grid(_) => ErrorKind::Usage,
-        FramesError::Shape(_) => ErrorKind::Input,
-        _ => ErrorKind::Failure,
-    };
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -192,7 +121,7 @@ mod tests {
         );
         let stopped = Error::interruption("stopped").kind().exit_status();
         assert_eq!(stopped, 130);
-        let refused: Error = io::Error::other("disk full").into();
+        let refused: Error = std::io::Error::other("disk full").into();
         assert_eq!(
             (refused.kind(), refused.kind().exit_status()),
             (ErrorKind::Failure, 1)

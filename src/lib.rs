@@ -40,6 +40,7 @@ mod error;
 mod evaluate;
 mod formats;
 mod geometry;
+mod kinds;
 mod matching;
 mod memory;
 mod picture;

@@ -40,6 +40,23 @@ pub(crate) fn read(path: &Path) -> Result<Shape, ShapeError> {
     shape.checked()
 }
 
+impl Shape {
+    /// Reads a mesh or a point cloud, PLY or OBJ by the ending of its name.
+    ///
+    /// # Errors
+    /// One line that names the file, the place in it, what was found there and what is allowed.
+    ///
+    /// # Examples
+    /// ```no_run
+    /// let fox = isomorph::Shape::read("data/fox/source.ply")?;
+    /// println!("{} vertices", fox.mesh.vertices.len());
+    /// # Ok::<(), isomorph::Error>(())
+    /// ```
+    pub fn read(path: impl AsRef<Path>) -> crate::Result<Self> {
+        Ok(read(path.as_ref())?)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

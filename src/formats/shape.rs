@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use super::error::{FEWEST_POINTS, ShapeError};
-use super::write::{SurfaceFormat, write_surface};
 use crate::geometry::{Mesh, cloud_area};
 
 /// A mesh or a point cloud as its file gives it: in the user's coordinates and vertex order.
@@ -28,38 +27,6 @@ impl Shape {
             path: PathBuf::from("shape"),
             mesh,
         }
-    }
-
-    /// Reads a mesh or a point cloud, PLY or OBJ by the ending of its name.
-    ///
-    /// # Errors
-    /// One line that names the file, the place in it, what was found there and what is allowed.
-    ///
-    /// # Examples
-    /// ```no_run
-    /// let fox = isomorph::Shape::read("data/fox/source.ply")?;
-    /// println!("{} vertices", fox.mesh.vertices.len());
-    /// # Ok::<(), isomorph::Error>(())
-    /// ```
-    pub fn read(path: impl AsRef<Path>) -> crate::Result<Self> {
-        Ok(super::read(path.as_ref())?)
-    }
-
-    /// Writes the shape, PLY or OBJ by the ending of the name; whole or not at all.
-    ///
-    /// # Errors
-    /// Another ending; indices out of range; what the file system says.
-    pub fn write(&self, path: impl AsRef<Path>) -> crate::Result<()> {
-        let path = path.as_ref();
-        let format = SurfaceFormat::of(path).ok_or_else(|| ShapeError::UnknownFormat {
-            path: path.to_owned(),
-            extension: path
-                .extension()
-                .unwrap_or_default()
-                .to_string_lossy()
-                .into(),
-        })?;
-        Ok(write_surface(&self.mesh, path, format)?)
     }
 
     /// Whether the shape has faces; without any it is a point cloud.

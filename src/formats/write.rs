@@ -15,6 +15,8 @@ use ply_rs::ply::{
 };
 use ply_rs::writer::Writer;
 
+use super::error::ShapeError;
+use super::shape::Shape;
 use crate::atomic::write_atomically;
 use crate::geometry::Mesh;
 
@@ -285,6 +287,25 @@ fn write_obj(surface: &Mesh<f64>, wide: bool, out: &mut dyn Write) -> io::Result
         }
     }
     Ok(())
+}
+
+impl Shape {
+    /// Writes the shape, PLY or OBJ by the ending of the name; whole or not at all.
+    ///
+    /// # Errors
+    /// Another ending; indices out of range; what the file system says.
+    pub fn write(&self, path: impl AsRef<Path>) -> crate::Result<()> {
+        let path = path.as_ref();
+        let format = SurfaceFormat::of(path).ok_or_else(|| ShapeError::UnknownFormat {
+            path: path.to_owned(),
+            extension: path
+                .extension()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into(),
+        })?;
+        Ok(write_surface(&self.mesh, path, format)?)
+    }
 }
 
 #[cfg(test)]
