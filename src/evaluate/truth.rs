@@ -134,7 +134,7 @@ impl GroundTruth {
     ///
     /// # Errors
     /// [`TruthError::Span`] unless both exist and at least one frame lies between them.
-    pub fn span(&self, from: usize, to: usize) -> Result<Span, TruthError> {
+    pub(crate) fn span(&self, from: usize, to: usize) -> Result<Span, TruthError> {
         let last = self.frames.len() - 1;
         if to > last || from >= to || to - from < 2 {
             let path = self.path.clone();
@@ -157,7 +157,7 @@ impl GroundTruth {
     ///
     /// # Panics
     /// If the span is of another sequence, or there are no points.
-    pub fn check_ends(
+    pub(crate) fn check_ends(
         &self,
         span: Span,
         normalisation: &Normalisation,
@@ -212,29 +212,29 @@ impl GroundTruth {
 
 /// Two frames with at least one between them; made by [`GroundTruth::span`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Span {
+pub(crate) struct Span {
     from: usize,
     to: usize,
 }
 
 impl Span {
     /// The frame at time 0.
-    pub fn from(&self) -> usize {
+    pub(crate) fn from(&self) -> usize {
         self.from
     }
 
     /// The frame at time 1.
-    pub fn to(&self) -> usize {
+    pub(crate) fn to(&self) -> usize {
         self.to
     }
 
     /// The frames strictly between the ends.
-    pub fn between(&self) -> std::ops::Range<usize> {
+    pub(crate) fn between(&self) -> std::ops::Range<usize> {
         self.from + 1..self.to
     }
 
     /// The time of a frame: `(frame - from) / (to - from)`.
-    pub fn time(&self, frame: usize) -> f64 {
+    pub(crate) fn time(&self, frame: usize) -> f64 {
         (frame as f64 - self.from as f64) / (self.to - self.from) as f64
     }
 }

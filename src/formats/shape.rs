@@ -39,7 +39,7 @@ impl Shape {
     ///
     /// # Errors
     /// [`ShapeError::Area`] if it is zero or overflows.
-    pub fn area(&self) -> Result<f64, ShapeError> {
+    pub(crate) fn area(&self) -> Result<f64, ShapeError> {
         let area = if self.is_mesh() {
             self.mesh.area()
         } else {

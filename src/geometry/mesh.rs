@@ -87,7 +87,7 @@ impl<T: Scalar> Mesh<T> {
     }
 
     /// Whether every edge lies in exactly two triangles that run along it in opposite directions, vertices
-    /// taken by their numbers; [`EdgeSharing`](super::EdgeSharing) takes them by their places.
+    /// taken by their numbers; `EdgeSharing` takes them by their places.
     ///
     /// An empty mesh is not closed.
     #[must_use]
@@ -112,7 +112,7 @@ impl<T: Scalar> Mesh<T> {
         used.len() as i64 - edges.len() as i64 + self.triangles.len() as i64
     }
 
-    /// Unit normals of the vertices, from the triangles: see [`vertex_normals`].
+    /// Unit normals of the vertices, from the triangles, weighted by area: see `vertex_normals`.
     #[must_use]
     pub fn vertex_normals(&self) -> Vec<[f32; 3]> {
         vertex_normals(&self.vertices, &self.triangles)

@@ -102,7 +102,7 @@ impl Matching {
     }
 
     /// Writes `source_index,target_index,confidence`, a line of these names first, as
-    /// [`Correspondences::read_csv`] reads it.
+    /// `data.correspondences` takes it.
     ///
     /// # Errors
     /// What the file system says; the message names the file.

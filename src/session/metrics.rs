@@ -81,7 +81,7 @@ impl Metrics {
     ///
     /// # Errors
     /// [`MetricsError`].
-    pub fn read(path: &Path) -> Result<Vec<Self>, MetricsError> {
+    pub(crate) fn read(path: &Path) -> Result<Vec<Self>, MetricsError> {
         let bytes = std::fs::read(path).map_err(|reason| MetricsError::Io {
             path: path.to_path_buf(),
             reason,

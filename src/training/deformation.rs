@@ -1,7 +1,7 @@
 //! The border to what was trained: a field and a motion of points on the host, in normalised coordinates,
 //! without the backend's type.
 //!
-//! [`OnHost`] takes points in chunks: on a processor as many as keep a layer's values in a core's cache, on
+//! `OnHost` takes points in chunks: on a processor as many as keep a layer's values in a core's cache, on
 //! all cores; on a device as many as fit.
 
 use burn::tensor::Tensor;

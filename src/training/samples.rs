@@ -11,7 +11,7 @@
 //! The band needs the carried positions, which only the device has: here stand its offsets from them.
 //! These shares gave the least error of those that were tried before the first release.
 //!
-//! Each kind of sample comes from a random stream of its own ([`stream`]): no two kinds share a draw, and
+//! Each kind of sample comes from a random stream of its own (`stream`): no two kinds share a draw, and
 //! what one kind takes does not shift another. A step's samples are drawn once; where the step is divided,
 //! each part takes its share of them ([`Drawn::part`]).
 

@@ -92,7 +92,7 @@ fn pairs_are_frames_of_the_sequence_with_one_between() {
     }
     let without = place.isomorph(&with(SMALL, &["--methods", "mlp"]));
     assert_eq!(without.code, Some(2), "{without:?}");
-    assert!(without.stderr.contains("--pairs"), "{without:?}");
+    assert!(without.stderr.contains("pairs are missing"), "{without:?}");
     let elsewhere = "compare --sequence nowhere.anime --pairs 0-4 --methods mlp";
     place
         .isomorph(&with(elsewhere, &[]))

@@ -89,7 +89,7 @@ fn a_key_that_does_nothing_is_refused_with_its_line_and_where_it_acts() {
     // The same words on the command line.
     let place = Workplace::tiny(&[]);
     let ended = place.isomorph(&["train", "recipe.toml", "--set", "loss.lambda-l=1"]);
-    ended.refused(2, &["--set loss.lambda-l=1", "does nothing"]);
+    ended.refused(2, &["set loss.lambda-l=1", "does nothing"]);
 }
 
 #[test]
@@ -126,7 +126,7 @@ fn a_bad_override_is_refused_with_its_words() {
         ("training.steps", "section.key=value"),
     ] {
         let ended = place.isomorph(&["train", "recipe.toml", "--run", "run", "--set", set]);
-        ended.refused(2, &[&format!("--set {set}"), allowed]);
+        ended.refused(2, &[&format!("set {set}"), allowed]);
     }
     assert_eq!(place.names(), before);
 }

@@ -139,8 +139,8 @@ mod tests {
         ]);
         assert_eq!(
             text,
-            "going on after step 99 of 400 on ndarray (Cpu): f has 2 weights, V has 2 weights; 2 \
-             points on the source, 2 on the target, 0 correspondences\n\
+            "going on after step 99 of 400 on ndarray (Cpu): f has 2 weights, V has 2 weights; key \
+             frames of 2 and 2 points, 0 correspondences\n\
              ramp from step 100 on\n\
              step 100 of 400, ramp, 1m40s, 2m30s left, peak 300 MiB: total 1.50 (matching 1.50)\n",
             "300 steps of half a second are left"

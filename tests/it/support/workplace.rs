@@ -76,6 +76,8 @@ impl Workplace {
         command
             .current_dir(self.0.path())
             .args(arguments)
+            // Without it some Vulkan and GL libraries complain on the program's standard error.
+            .env("XDG_RUNTIME_DIR", self.0.path())
             .stdin(Stdio::null());
         command
     }
