@@ -5,7 +5,7 @@ use std::path::Path;
 
 /// From the lowest to the highest; files of one row do not use each other.
 const ORDER: [&[&str]; 6] = [
-    &["autodiff"],
+    &["autodiff", "linear"],
     &["nets"],
     &["operators"],
     &["loss", "objective"],
