@@ -3,6 +3,9 @@
 //! Both are plain arrays, because points live in arrays wherever they come from or go to: files, k-d
 //! trees, tensors, JSON. A crate such as glam would need a conversion at each of these borders and
 //! has no eigenvectors; what is used of it is written here in a few lines.
+//!
+//! The smallest are marked `#[inline]`: without link-time optimisation they would else stay calls, and their
+//! callers are loops over all points.
 
 use std::fmt::Debug;
 use std::ops::{Add, Mul, Sub};
@@ -41,26 +44,31 @@ pub(crate) const IDENTITY: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0
 const SWEEPS: usize = 10;
 
 /// `a + b`.
+#[inline]
 pub(crate) fn add<T: Scalar>(a: [T; 3], b: [T; 3]) -> [T; 3] {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
 /// `a - b`.
+#[inline]
 pub(crate) fn difference<T: Scalar>(a: [T; 3], b: [T; 3]) -> [T; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
 /// `factor x`.
+#[inline]
 pub(crate) fn scaled<T: Scalar>(x: [T; 3], factor: T) -> [T; 3] {
     x.map(|part| factor * part)
 }
 
 /// Scalar product.
+#[inline]
 pub(crate) fn dot<T: Scalar>(a: [T; 3], b: [T; 3]) -> T {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// Vector product.
+#[inline]
 pub(crate) fn cross<T: Scalar>(a: [T; 3], b: [T; 3]) -> [T; 3] {
     [
         a[1] * b[2] - a[2] * b[1],
@@ -70,6 +78,7 @@ pub(crate) fn cross<T: Scalar>(a: [T; 3], b: [T; 3]) -> [T; 3] {
 }
 
 /// Euclidean length.
+#[inline]
 pub(crate) fn length(v: [f64; 3]) -> f64 {
     dot(v, v).sqrt()
 }
@@ -98,6 +107,7 @@ pub(crate) fn mean(points: impl Iterator<Item = [f64; 3]> + Clone) -> [f64; 3] {
 }
 
 /// `M x`.
+#[inline]
 pub(crate) fn times(m: &Matrix, x: [f64; 3]) -> [f64; 3] {
     [0, 1, 2].map(|row| dot(m[row], x))
 }
