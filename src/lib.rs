@@ -46,6 +46,7 @@ mod memory;
 mod picture;
 mod session;
 mod shape;
+mod solved;
 mod surface;
 
 pub use backend::Backend;

@@ -26,7 +26,7 @@ pub(super) struct InitArgs {
     #[arg(long, value_name = "FILE", default_value = "none")]
     correspondences: String,
 
-    /// Values of all other keys: quick, default, quality or paper
+    /// Values of all other keys: instant, quick, default, quality or paper
     #[arg(long, default_value = "default")]
     preset: String,
 

@@ -58,7 +58,7 @@ pub(crate) fn difference<T: Scalar>(a: [T; 3], b: [T; 3]) -> [T; 3] {
 /// `factor x`.
 #[inline]
 pub(crate) fn scaled<T: Scalar>(x: [T; 3], factor: T) -> [T; 3] {
-    x.map(|part| factor * part)
+    [factor * x[0], factor * x[1], factor * x[2]]
 }
 
 /// Scalar product.

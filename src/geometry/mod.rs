@@ -9,6 +9,7 @@
 //! | `components.rs` | the connected pieces of a mesh, without the small ones if desired |
 //! | `neighbours.rs` | k nearest neighbours |
 //! | `density.rs` | the spacing of points, and the area that they stand for |
+//! | `triangles.rs` | closest points of a mesh, and its winding number |
 //! | `winding.rs` | winding numbers of points with normals |
 //!
 //! Conventions: triangles wind counter-clockwise seen from outside, so normals point outwards and the
@@ -24,6 +25,7 @@ mod mesh;
 mod neighbours;
 #[cfg(test)]
 pub(crate) mod testing;
+mod triangles;
 pub(crate) mod winding;
 
 pub(crate) use density::cloud_area;
@@ -34,3 +36,4 @@ pub use linear::Scalar;
 pub use mesh::Mesh;
 pub(crate) use mesh::vertex_normals;
 pub(crate) use neighbours::{Neighbour, NeighbourSearch};
+pub(crate) use triangles::TriangleSearch;

@@ -75,3 +75,51 @@ pub(crate) fn torus_cloud(
     }
     points
 }
+
+/// A closed mesh like a sphere of radius 0.4 with bumps of a tenth of that: `2 n` vertices around, `n` rings.
+pub(crate) fn bumpy_sphere(n: u32) -> Mesh<f64> {
+    let around = 2 * n;
+    let at = |ring: u32, k: u32| {
+        let polar = std::f64::consts::PI * f64::from(ring) / f64::from(n);
+        let angle = std::f64::consts::TAU * f64::from(k) / f64::from(around);
+        let radius = 0.4 * (1.0 + 0.1 * (3.0 * angle).sin() * (4.0 * polar).sin() * polar.sin());
+        [
+            radius * polar.sin() * angle.cos(),
+            radius * polar.sin() * angle.sin(),
+            radius * polar.cos(),
+        ]
+    };
+    let mut vertices = vec![at(0, 0)];
+    vertices.extend((1..n).flat_map(|ring| (0..around).map(move |k| at(ring, k))));
+    vertices.push(at(n, 0));
+    let last = vertices.len() as u32 - 1;
+    let name = |ring: u32, k: u32| match ring {
+        0 => 0,
+        _ if ring == n => last,
+        _ => 1 + (ring - 1) * around + k % around,
+    };
+    let mut triangles = Vec::new();
+    for ring in 0..n {
+        for k in 0..around {
+            let [a, b, c, d] = [
+                name(ring, k),
+                name(ring + 1, k),
+                name(ring + 1, k + 1),
+                name(ring, k + 1),
+            ];
+            triangles.extend(
+                [[a, b, c], [a, c, d]]
+                    .into_iter()
+                    .filter(|[x, y, z]| x != y && y != z && z != x),
+            );
+        }
+    }
+    Mesh::new(vertices, triangles)
+}
+
+/// Places uniform in the cube of this half side about the origin.
+pub(crate) fn random_places(count: usize, half: f32, seed: u64) -> Vec<[f32; 3]> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut place = || [(); 3].map(|()| rng.random_range(-half..half));
+    (0..count).map(|_| place()).collect()
+}

@@ -1,8 +1,9 @@
 //! From a method that was trained, or a checkpoint of it, to surfaces and motion.
 
 use isomorph_training::deformation::Deformation;
-use isomorph_training::engine::Engine;
+use isomorph_training::engine::{Engine, Trainer};
 use isomorph_training::method::spec_of;
+use isomorph_training::method::spline::is_solved;
 
 use super::checkpoint::Checkpoint;
 use crate::error::{Error, Result};
@@ -10,6 +11,7 @@ use crate::formats;
 use crate::geometry::{Bounds, Mesh};
 use crate::recipe::Recipe;
 use crate::shape::Normalisation;
+use crate::solved::Solved;
 use crate::surface::learned::Learned;
 
 /// The frame of the key frames: where the user's coordinates lie in the networks'.
@@ -75,7 +77,11 @@ pub(super) fn load(
     engine: &dyn Engine,
 ) -> Result<Learned> {
     let state = &checkpoint.state;
-    let mut trainer = engine.method(recipe, &state.bounds)?;
+    let mut trainer: Box<dyn Trainer> = if is_solved(recipe) {
+        Box::new(Solved::unset(recipe))
+    } else {
+        engine.method(recipe, &state.bounds)?
+    };
     let restored = trainer.restore(&checkpoint.records()?);
     restored.map_err(|error| checkpoint.damaged(error))?;
     let frame = Frame {

@@ -14,14 +14,13 @@ use crate::event::{Event, StepReport, TermReport};
 use crate::memory;
 use crate::recipe::{Change, Recipe};
 use crate::shape::{Keyframes, Normalisation};
+use crate::solved::Solved;
 
 /// Why training stopped before its last step.
 #[derive(Debug, thiserror::Error)]
 pub enum LearnerError {
     /// A term of the objective is not a number any more.
-    #[error(
-        "step {step}: the {term} term is {value}; {last}; try a smaller training.learning-rate"
-    )]
+    #[error("step {step}: the {term} term is {value}; {last}; {cure}")]
     NotFinite {
         /// The step, counted from 1.
         step: usize,
@@ -31,6 +30,8 @@ pub enum LearnerError {
         value: f64,
         /// Where the last good checkpoint is.
         last: String,
+        /// What to try.
+        cure: &'static str,
     },
     /// The method needs what the shapes do not have.
     #[error("{0}")]
@@ -98,8 +99,14 @@ impl Learner {
     ) -> Result<Self, LearnerError> {
         let data = keyframes.training_data();
         method::check(&recipe, &data).map_err(LearnerError::Missing)?;
+        let trainer: Box<dyn Trainer> = if method::spline::is_solved(&recipe) {
+            let solved = Solved::new(&recipe, keyframes).map_err(LearnerError::Missing)?;
+            Box::new(solved)
+        } else {
+            engine.method(&recipe, &data.bounds)?
+        };
         Ok(Self {
-            trainer: engine.method(&recipe, &data.bounds)?,
+            trainer,
             normalisation: keyframes.normalisation,
             backend: engine.backend(),
             device: engine.device(),
@@ -243,6 +250,11 @@ impl Learner {
             term: term.name,
             value: term.raw,
             last,
+            cure: if method::spline::is_solved(&self.recipe) {
+                "look for points or pairs far from the rest, or take the preset \"quick\""
+            } else {
+                "try a smaller training.learning-rate"
+            },
         })
     }
 

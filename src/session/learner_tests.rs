@@ -45,6 +45,7 @@ fn spheres() -> Keyframes {
             points: key.points.clone(),
             normals: key.normals.clone(),
         },
+        mesh: None,
     });
     Keyframes {
         keys: keys.collect(),

@@ -16,7 +16,7 @@ use rayon::prelude::*;
 
 use crate::geometry::NeighbourSearch;
 use crate::geometry::density::{self, areas, squared_spacing};
-use crate::geometry::linear::{difference, dot};
+use crate::geometry::linear::{difference, dot, unit};
 use crate::geometry::winding::{Charges, SummationTree};
 
 /// Nearest points whose planes are averaged.
@@ -99,6 +99,21 @@ impl SignedDistance {
             plane
         };
         magnitude.copysign(side) as f32
+    }
+
+    /// The gradient of the signed distance at `x`: by central differences of a few spacings, since close to
+    /// the points it is pieced together from their planes.
+    pub(super) fn slope(&self, x: [f32; 3]) -> [f32; 3] {
+        let by = (self.close / 2.0) as f32;
+        let difference = |axis: usize| {
+            let moved = |by: f32| {
+                let mut x = x;
+                x[axis] += by;
+                self.at(x)
+            };
+            moved(by) - moved(-by)
+        };
+        unit([difference(0), difference(1), difference(2)])
     }
 }
 

@@ -19,7 +19,7 @@ use super::normals::estimate_normals;
 use super::sample::{point_at, sample_surface};
 use crate::formats::{FEWEST_POINTS, Shape, ShapeError};
 use crate::geometry::winding::is_inside_out;
-use crate::geometry::{Bounds, EdgeSharing, NeighbourSearch};
+use crate::geometry::{Bounds, EdgeSharing, Mesh, NeighbourSearch};
 
 /// Where correspondences come from.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -81,6 +81,8 @@ pub struct Keyframe {
     pub time: f64,
     /// Its points, normalised.
     pub cloud: PointCloud,
+    /// The shape itself, normalised and wound outwards, if it is a closed mesh.
+    pub(crate) mesh: Option<Mesh<f32>>,
 }
 
 /// Two or more shapes at their times, made ready for training.
@@ -219,7 +221,9 @@ pub(crate) fn prepare(shapes: &[Shape], options: &DataOptions) -> Result<Keyfram
             points: points.collect(),
             normals,
         };
-        keys.push(Keyframe { time, cloud });
+        let mesh =
+            closed(shape, options.normals).map(|mesh| mesh.moved(|x| normalisation.apply(x)));
+        keys.push(Keyframe { time, cloud, mesh });
     }
     let boxes = keys.iter().map(|key| Bounds::of(&key.cloud.points));
     let bounds = boxes.reduce(|all, next| all.union(&next));
@@ -230,6 +234,20 @@ pub(crate) fn prepare(shapes: &[Shape], options: &DataOptions) -> Result<Keyfram
         normalisation,
         notes,
     })
+}
+
+/// The mesh of a shape if it is closed, wound outwards unless its own winding is to be kept.
+fn closed(shape: &Shape, wanted: NormalSource) -> Option<Mesh<f64>> {
+    if !shape.is_mesh() || !EdgeSharing::of(&shape.mesh).is_closed() {
+        return None;
+    }
+    let mut mesh = shape.mesh.clone();
+    if mesh.volume() < 0.0 && wanted != NormalSource::Given {
+        mesh.triangles
+            .iter_mut()
+            .for_each(|triangle| triangle.swap(1, 2));
+    }
+    Some(mesh)
 }
 
 /// Points in the user's coordinates, and their normals unless none are wanted.

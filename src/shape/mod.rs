@@ -3,6 +3,7 @@
 //! | file | what it does |
 //! |---|---|
 //! | `sample.rs` | area-uniform points on a mesh |
+//! | `solid.rs` | the signed distance of a shape as it is |
 //! | `distance.rs` | signed distances to points with normals |
 //! | `normals.rs` | normals of a raw cloud, pointing outwards |
 //! | `correspond.rs` | pairs of vertices that are known to correspond |
@@ -20,6 +21,7 @@ mod keyframes;
 mod normalise;
 mod normals;
 mod sample;
+mod solid;
 
 pub(crate) use crate::formats::{FEWEST_POINTS, Shape, ShapeError};
 pub(crate) use crate::geometry::{Bounds, NeighbourSearch};
@@ -30,3 +32,4 @@ pub use keyframes::{Keyframe, Keyframes, PointCloud};
 pub(crate) use normalise::Normalisation;
 pub(crate) use normals::estimate_normals;
 pub(crate) use sample::{SurfaceSamples, sample_surface};
+pub(crate) use solid::{Solid, SolidParts};

@@ -145,15 +145,18 @@ impl<'a> FlowMap<'a> {
             return self.ends[index(place.node, self.nodes)];
         }
         let [x, y, z] = place.beyond.map(cubic);
-        let weights = z.iter().flat_map(|z| {
-            let y = y.iter().map(move |y| y * z);
-            y.flat_map(move |yz| x.map(|x| x * yz))
-        });
         let mut sum = [0.0; 6];
-        for (weight, node) in weights.zip(stencil(place.node)) {
-            let ends = &self.ends[index(node, self.nodes)];
-            for (sum, end) in sum.iter_mut().zip(ends) {
-                *sum += weight * f64::from(*end);
+        // Rows of four nodes that follow each other in memory, in the order of `stencil`.
+        for (c, z) in z.into_iter().enumerate() {
+            for (b, y) in y.into_iter().enumerate() {
+                let [i, j, k] = place.node;
+                let first = index([i - 1, j - 1 + b, k - 1 + c], self.nodes);
+                for (ends, x) in self.ends[first..first + 4].iter().zip(x) {
+                    let weight = x * y * z;
+                    for axis in 0..6 {
+                        sum[axis] += weight * f64::from(ends[axis]);
+                    }
+                }
             }
         }
         sum.map(|end| end as f32)

@@ -204,7 +204,7 @@ fn mean_slope_error(gradients: &[[f32; 3]]) -> f64 {
 }
 
 /// At most so many of the points, evenly spread over their order.
-pub(super) fn some_of(points: &[[f32; 3]], most: usize) -> Vec<[f32; 3]> {
+pub(crate) fn some_of(points: &[[f32; 3]], most: usize) -> Vec<[f32; 3]> {
     let apart = points.len().div_ceil(most).max(1);
     points.iter().step_by(apart).copied().collect()
 }

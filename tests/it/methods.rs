@@ -23,8 +23,8 @@ pub(crate) struct Method {
     pub(crate) has_motion: bool,
 }
 
-/// Ours as it ships, the paper's geometry, and every other `method.name`.
-pub(crate) const METHODS: [Method; 9] = [
+/// Ours as it ships, the paper's geometry, splines, and every other `method.name`.
+pub(crate) const METHODS: [Method; 10] = [
     Method {
         name: "shipped",
         keys: &[],
@@ -34,6 +34,16 @@ pub(crate) const METHODS: [Method; 9] = [
     Method {
         name: "network",
         keys: NETWORK,
+        has_field: true,
+        has_motion: true,
+    },
+    Method {
+        name: "spline",
+        keys: &[
+            "velocity.kind = \"spline\"",
+            "spline.band = 2000",
+            "spline.surface-samples = 50",
+        ],
         has_field: true,
         has_motion: true,
     },
@@ -102,7 +112,7 @@ impl Method {
                 "training.batch = 200",
                 "training.correspondence-batch = 40",
             ],
-            "eigenbasis" => &["training.correspondence-batch = 40"],
+            "spline" | "eigenbasis" => &["training.correspondence-batch = 40"],
             "nfgp" => &[
                 "implicit.width = 32",
                 "training.batch = 200",

@@ -25,6 +25,7 @@ use crate::tensors::rows;
 pub(super) static EIGENBASIS: MethodSpec = MethodSpec {
     name: "eigenbasis",
     geometry: None,
+    velocity: None,
     about: "a divergence-free flow in a sine basis, fitted to the correspondences",
     citation: "Eisenberger, Laehner, Cremers, \"Divergence-Free Shape Interpolation and \
                Correspondence\", Eurographics 2019",
@@ -61,9 +62,9 @@ section! {
     /// The keys of the method "eigenbasis".
     eigenbasis: EigenbasisKeys {
         /// Sine modes along each axis.
-        modes: usize = 6 | 6 | 6 | 6, Rule::whole(1, 16);
+        modes: usize = 6 | 6 | 6 | 6 | 6, Rule::whole(1, 16);
         /// Weight of the regulariser that keeps the modes small, higher ones more.
-        prior: f64 = 0.01 | 0.01 | 0.01 | 0.01, Rule::positive_or_zero().zero("turns it off");
+        prior: f64 = 0.01 | 0.01 | 0.01 | 0.01 | 0.01, Rule::positive_or_zero().zero("turns it off");
     }
 }
 

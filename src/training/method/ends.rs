@@ -28,6 +28,7 @@ use crate::tensors::{column, rows};
 pub(super) static MLP: MethodSpec = MethodSpec {
     name: "mlp",
     geometry: None,
+    velocity: None,
     about: "one network f(x, t), fitted at t = 0 and t = 1 only",
     citation: "the baseline of the same name in Sang et al., ICLR 2025, Section 5",
     needs: Needs::NOTHING,
@@ -42,6 +43,7 @@ pub(super) static MLP: MethodSpec = MethodSpec {
 pub(super) static SDF_BLEND: MethodSpec = MethodSpec {
     name: "sdf-blend",
     geometry: None,
+    velocity: None,
     about: "the linear blend of two distance fields, (1 - t) g + t h",
     citation: "Payne and Toga, \"Distance field manipulation of surface models\", 1992",
     needs: Needs::NOTHING,
@@ -56,6 +58,7 @@ pub(super) static SDF_BLEND: MethodSpec = MethodSpec {
 pub(super) static LIPMLP: MethodSpec = MethodSpec {
     name: "lipmlp",
     geometry: None,
+    velocity: None,
     about: "one network f(x, t) with a small Lipschitz constant, fitted at t = 0 and t = 1 only",
     citation: "Liu, Williams, Jacobson, Fidler, Litany, \"Learning Smooth Neural Functions via \
                Lipschitz Regularization\", SIGGRAPH 2022",
@@ -96,9 +99,9 @@ section! {
     /// The keys of the method "lipmlp".
     lipmlp: LipmlpKeys {
         /// Weight of the bound on the Lipschitz constant.
-        lipschitz: f64 = 1e-6 | 1e-6 | 1e-6 | 1e-6, Rule::positive_or_zero().zero("turns it off");
+        lipschitz: f64 = 1e-6 | 1e-6 | 1e-6 | 1e-6 | 1e-6, Rule::positive_or_zero().zero("turns it off");
         /// Factor on positions before the network, so that the bound acts on time.
-        space_scale: f64 = 100 | 100 | 100 | 100, Rule::above_zero(1e6);
+        space_scale: f64 = 100 | 100 | 100 | 100 | 100, Rule::above_zero(1e6);
     }
 }
 

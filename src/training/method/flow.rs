@@ -14,7 +14,7 @@ use crate::data::{Bounds, TrainingData};
 use crate::flow_step::FlowStep;
 use crate::motion::Motion;
 use crate::posed::{Posed, Slopes};
-use crate::recipe::{GeometryKind, Recipe};
+use crate::recipe::{GeometryKind, Recipe, VelocityKind};
 use crate::records::{RecordError, Records};
 use crate::report::{Phase, Rates};
 use crate::samples::{self, Batch, BatchSizes, Drawn, EndBatch};
@@ -26,6 +26,7 @@ use crate::tensors::rows;
 pub(super) static FLOW: MethodSpec = MethodSpec {
     name: "velocity-field",
     geometry: Some(GeometryKind::Flow),
+    velocity: Some(VelocityKind::Network),
     about: "two end fields, carried by a velocity field V: the default",
     citation: "after Sang, Canfes, Cao, Bernard, Cremers, \"Implicit Neural Surface \
                Deformation with Explicit Velocity Fields\", ICLR 2025; the geometry is ours",

@@ -5,6 +5,7 @@
 //! | `flow.rs` | `velocity-field` with `implicit.geometry = "flow"`: the default |
 //! | `network.rs` | `velocity-field` with `implicit.geometry = "network"`: the paper's |
 //! | `ends.rs` | `mlp`, `sdf-blend`, `lipmlp`: fitted at t = 0 and t = 1 only |
+//! | `spline.rs` | `velocity-field` with `velocity.kind = "spline"`: solved for, not trained |
 //! | `nise.rs` | `nise`, `nise-velocity` |
 //! | `eigenbasis.rs` | `eigenbasis` |
 //! | `nfgp.rs` | `nfgp` |
@@ -21,6 +22,7 @@ mod network;
 mod nfgp;
 mod nise;
 pub(crate) mod spec;
+pub mod spline;
 
 use std::io;
 
@@ -31,7 +33,7 @@ use isomorph_model::{Geometry, Motion, TrainBackend};
 use crate::data::{Bounds, TrainingData};
 use crate::optimiser::{self, AdamOf};
 use crate::posed::{Posed, Slopes};
-use crate::recipe::{Change, GeometryKind, Recipe};
+use crate::recipe::{Change, GeometryKind, Recipe, VelocityKind};
 use crate::records::{RecordError, Records};
 use crate::report::{Phase, Rates};
 use crate::samples::Drawn;
@@ -42,10 +44,11 @@ pub use spec::{MethodSpec, Needs};
 macro_rules! methods {
     (
         own { $($o:ident::$OWN:ident => $Own:ident,)+ }
+        solved { $($s:ident::$SOLVED:ident,)+ }
         baselines { $($b:ident::$BASE:ident => $Base:ident,)+ }
     ) => {
         /// Every method.
-        pub static METHODS: &[&MethodSpec] = &[$(&$o::$OWN,)+ $(&$b::$BASE,)+];
+        pub static METHODS: &[&MethodSpec] = &[$(&$o::$OWN,)+ $(&$s::$SOLVED,)+ $(&$b::$BASE,)+];
 
         /// The default method or the paper's, before its first step; `None` if the recipe names another.
         /// `bounds` encloses all key frames, normalised.
@@ -82,6 +85,9 @@ methods! {
         flow::FLOW => EndsAndFlow,
         network::NETWORK => VelocityField,
     }
+    solved {
+        spline::SPLINE,
+    }
     baselines {
         ends::MLP => FitMlp,
         ends::SDF_BLEND => FitBlend,
@@ -103,14 +109,22 @@ pub fn names() -> Vec<&'static str> {
 
 /// The method of a recipe.
 pub fn spec_of(recipe: &Recipe) -> &'static MethodSpec {
-    let found = spec(recipe.method.name, recipe.implicit.geometry);
+    let kind = recipe.velocity.kind;
+    let found = spec(recipe.method.name, recipe.implicit.geometry, kind);
     found.expect("a recipe takes its method's name from the list")
 }
 
-/// The method of a name, where two have it that of the geometry.
-pub(crate) fn spec(name: &str, geometry: GeometryKind) -> Option<&'static MethodSpec> {
-    let fits =
-        |spec: &&&MethodSpec| spec.name == name && spec.geometry.is_none_or(|own| own == geometry);
+/// The method of a name, where several have it that of the kind of V and of the geometry.
+pub(crate) fn spec(
+    name: &str,
+    geometry: GeometryKind,
+    kind: VelocityKind,
+) -> Option<&'static MethodSpec> {
+    let fits = |spec: &&&MethodSpec| {
+        spec.name == name
+            && spec.geometry.is_none_or(|own| own == geometry)
+            && spec.velocity.is_none_or(|own| own == kind)
+    };
     METHODS.iter().find(fits).copied()
 }
 

@@ -13,7 +13,7 @@ use crate::data::{Bounds, TrainingData};
 use crate::motion::Motion;
 use crate::network_step::Step;
 use crate::posed::{Posed, Slopes};
-use crate::recipe::{GeometryKind, Recipe};
+use crate::recipe::{GeometryKind, Recipe, VelocityKind};
 use crate::records::{RecordError, Records};
 use crate::report::{Phase, Rates};
 use crate::samples::{self, Batch, BatchSizes, Drawn};
@@ -24,6 +24,7 @@ use crate::settings::Settings;
 pub(super) static NETWORK: MethodSpec = MethodSpec {
     name: "velocity-field",
     geometry: Some(GeometryKind::Network),
+    velocity: Some(VelocityKind::Network),
     about: "one network f(x, t), tied to a velocity field V by the level-set equation: the paper's",
     citation: "Sang, Canfes, Cao, Bernard, Cremers, \"Implicit Neural Surface Deformation with \
                Explicit Velocity Fields\", ICLR 2025",

@@ -27,6 +27,7 @@ use crate::tensors::rows;
 pub(super) static NFGP: MethodSpec = MethodSpec {
     name: "nfgp",
     geometry: None,
+    velocity: None,
     about: "invertible deformations, one for each time",
     citation: "Yang, Belongie, Hariharan, Koltun, \"Geometry Processing with Neural Fields\", \
                NeurIPS 2021",
@@ -71,15 +72,15 @@ section! {
     /// The keys of the method "nfgp".
     nfgp: NfgpKeys {
         /// Times at which a deformation is fitted, each with its share of the steps.
-        deformations: usize = 8 | 8 | 8 | 8, Rule::whole(1, 1000);
+        deformations: usize = 8 | 8 | 8 | 8 | 8, Rule::whole(1, 1000);
         /// Residual blocks of a deformation.
-        blocks: usize = 6 | 6 | 6 | 6, Rule::whole(1, 32);
+        blocks: usize = 6 | 6 | 6 | 6 | 6, Rule::whole(1, 32);
         /// Weight of the distance of the known points (handles) from their targets at that time.
-        handles: f64 = 100 | 100 | 100 | 100, Rule::positive_or_zero().zero("turns it off");
+        handles: f64 = 100 | 100 | 100 | 100 | 100, Rule::positive_or_zero().zero("turns it off");
         /// Weight of the change of lengths on the surface.
-        stretch: f64 = 0.1 | 0.1 | 0.1 | 0.1, Rule::positive_or_zero().zero("turns it off");
+        stretch: f64 = 0.1 | 0.1 | 0.1 | 0.1 | 0.1, Rule::positive_or_zero().zero("turns it off");
         /// Weight of the change of curvature.
-        bend: f64 = 1e-3 | 1e-3 | 1e-3 | 1e-3, Rule::positive_or_zero().zero("turns it off");
+        bend: f64 = 1e-3 | 1e-3 | 1e-3 | 1e-3 | 1e-3, Rule::positive_or_zero().zero("turns it off");
     }
 }
 

@@ -32,6 +32,7 @@ use crate::tensors::{column, rows};
 pub(super) static NISE: MethodSpec = MethodSpec {
     name: "nise",
     geometry: None,
+    velocity: None,
     about: "two end fields, and f(x, t) between them under a level-set equation",
     citation: CITATION,
     needs: Needs::NOTHING,
@@ -46,6 +47,7 @@ pub(super) static NISE: MethodSpec = MethodSpec {
 pub(super) static NISE_VELOCITY: MethodSpec = MethodSpec {
     name: "nise-velocity",
     geometry: None,
+    velocity: None,
     about: "the same as nise with an interpolated velocity",
     citation: CITATION,
     needs: Needs::NOTHING,
@@ -60,14 +62,14 @@ section! {
     /// The keys of the methods "nise" and "nise-velocity".
     nise: NiseKeys {
         /// Until here only the two end fields train.
-        ends_until: f64 = 0.4 | 0.4 | 0.4 | 0.4, Rule::above_zero(0.9).unit("share of the steps");
+        ends_until: f64 = 0.4 | 0.4 | 0.4 | 0.4 | 0.4, Rule::above_zero(0.9).unit("share of the steps");
         /// Frequency of the sine networks. Its authors print 20 to 30.
-        omega: f64 = 20 | 20 | 20 | 20, Rule::above_zero(1000.0);
+        omega: f64 = 20 | 20 | 20 | 20 | 20, Rule::above_zero(1000.0);
         /// Weight of the difference between f and the end fields at t = 0 and t = 1.
-        ends: f64 = 10_000 | 10_000 | 10_000 | 10_000,
+        ends: f64 = 10_000 | 10_000 | 10_000 | 10_000 | 10_000,
             Rule::positive_or_zero().zero("frees f from its ends");
         /// Weight of the residual of the equation between them.
-        residual: f64 = 10 | 10 | 10 | 10, Rule::positive_or_zero().zero("turns it off");
+        residual: f64 = 10 | 10 | 10 | 10 | 10, Rule::positive_or_zero().zero("turns it off");
     }
 }
 

@@ -1,7 +1,7 @@
 //! What a method is, apart from what it computes: [`MethodSpec`], one for each method, in its own file.
 
-use crate::recipe::GeometryKind;
 use crate::recipe::schema::{Key, Section};
+use crate::recipe::{GeometryKind, VelocityKind};
 
 /// A method of the recipe: its name, its needs and the keys on which it acts.
 #[derive(Debug)]
@@ -10,6 +10,8 @@ pub struct MethodSpec {
     pub name: &'static str,
     /// `implicit.geometry`, where that is a part of what the method is.
     pub geometry: Option<GeometryKind>,
+    /// `velocity.kind`, where that is a part of what the method is.
+    pub velocity: Option<VelocityKind>,
     /// What it is, in one line.
     pub about: &'static str,
     /// Where it was published.
@@ -87,10 +89,10 @@ impl Keys {
     }
 }
 
-/// No two methods have both the name and the geometry in common.
+/// No two methods have the name, the geometry and the kind of V in common.
 impl PartialEq for MethodSpec {
     fn eq(&self, other: &Self) -> bool {
-        (self.name, self.geometry) == (other.name, other.geometry)
+        (self.name, self.geometry, self.velocity) == (other.name, other.geometry, other.velocity)
     }
 }
 
@@ -102,6 +104,7 @@ impl MethodSpec {
         let acts = &self.acts;
         match key.section {
             "implicit" if key.field == "geometry" => self.geometry.is_some(),
+            "velocity" if key.field == "kind" => self.velocity.is_some(),
             "implicit" => acts.implicit.hold(&key.name()),
             "velocity" => acts.velocity.hold(&key.name()),
             "loss" => acts.loss.hold(&key.name()),
@@ -120,9 +123,18 @@ impl MethodSpec {
 
     /// The method in messages: `velocity-field with implicit.geometry = "flow"`.
     pub fn described(&self) -> String {
-        match self.geometry {
-            Some(geometry) => format!("{} with implicit.geometry = \"{geometry}\"", self.name),
+        match self.choice() {
+            Some(choice) => format!("{} with {choice}", self.name),
             None => self.name.to_owned(),
+        }
+    }
+
+    /// The key that tells it from others of its name, as it is written.
+    pub(crate) fn choice(&self) -> Option<String> {
+        match (self.geometry, self.velocity) {
+            (Some(geometry), _) => Some(format!("implicit.geometry = \"{geometry}\"")),
+            (None, Some(kind)) => Some(format!("velocity.kind = \"{kind}\"")),
+            (None, None) => None,
         }
     }
 
@@ -132,8 +144,14 @@ impl MethodSpec {
         let geometry = self
             .geometry
             .map(|kind| format!("implicit.geometry={kind}"));
+        let kind = self.velocity.map(|kind| format!("velocity.kind={kind}"));
         let changes = self.changes.iter().map(|change| (*change).to_owned());
-        [name].into_iter().chain(geometry).chain(changes).collect()
+        [name]
+            .into_iter()
+            .chain(geometry)
+            .chain(kind)
+            .chain(changes)
+            .collect()
     }
 }
 

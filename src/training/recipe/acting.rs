@@ -133,14 +133,11 @@ fn homes(key: &Key, chosen: &MethodSpec) -> String {
     let mut homes: Vec<String> = Vec::new();
     for spec in METHODS.iter().filter(acts) {
         let siblings = METHODS.iter().filter(|other| other.name == spec.name);
-        let home = match spec.geometry {
-            Some(geometry) if spec.name == chosen.name => {
-                format!("implicit.geometry = \"{geometry}\"")
+        let home = match spec.choice() {
+            Some(choice) if spec.name == chosen.name => choice,
+            Some(choice) if siblings.filter(acts).count() == 1 => {
+                format!("method.name = \"{}\" with {choice}", spec.name)
             }
-            Some(geometry) if siblings.filter(acts).count() == 1 => format!(
-                "method.name = \"{}\" with implicit.geometry = \"{geometry}\"",
-                spec.name
-            ),
             _ => format!("method.name = \"{}\"", spec.name),
         };
         if !homes.contains(&home) {

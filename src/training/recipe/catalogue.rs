@@ -16,10 +16,10 @@ static METHOD: LazyLock<Section> = LazyLock::new(|| Section {
     keys: Vec::leak(vec![Key {
         section: "method",
         field: "name",
-        doc: "\"velocity-field\": the default, or the paper's method; implicit.geometry chooses \
-              between them. The others are methods that isomorph is compared with.",
+        doc: "\"velocity-field\": the default, or the paper's method; velocity.kind and \
+              implicit.geometry choose between its forms. The others are methods that isomorph is compared with.",
         rule: Rule::word(Vec::leak(names())),
-        columns: ["\"velocity-field\""; 4],
+        columns: ["\"velocity-field\""; 5],
     }]),
 });
 

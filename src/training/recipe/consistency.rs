@@ -3,7 +3,8 @@
 use super::entry::{Entries, Entry, Place};
 use super::error::RecipeError;
 use super::rule::Value;
-use super::words::Correspondences;
+use super::words::{Correspondences, VelocityKind};
+use crate::method::spline::MOST_STEPS;
 use crate::method::{MethodSpec, spec};
 
 /// How the first of two keys must compare with the second.
@@ -59,6 +60,7 @@ pub(super) fn check(
     between: &[Correspondences],
 ) -> Result<(), RecipeError> {
     lacks(entries, spec, between)?;
+    solves(entries, spec)?;
     for (first, relation, second) in RELATIONS {
         let (Some(one), Some(other)) = (entries.get(first), entries.get(second)) else {
             continue;
@@ -72,6 +74,23 @@ pub(super) fn check(
         });
     }
     Ok(())
+}
+
+/// Whether what is solved for has the few steps that it takes.
+fn solves(entries: &Entries, spec: &MethodSpec) -> Result<(), RecipeError> {
+    let (Some(steps), Some(kind)) = (entries.get("training.steps"), entries.get("velocity.kind"))
+    else {
+        return Ok(());
+    };
+    let solved = spec.velocity == Some(VelocityKind::Spline);
+    if !solved || magnitude(&steps.value) <= MOST_STEPS as f64 {
+        return Ok(());
+    }
+    Err(RecipeError::TooManySteps {
+        at: steps.about(),
+        most: MOST_STEPS,
+        kind: kind.about(),
+    })
 }
 
 /// Whether the method has what it learns from.

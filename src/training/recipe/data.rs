@@ -126,20 +126,20 @@ pub(super) static KEYFRAME: [Key; 3] = [
         field: "file",
         doc: "The shape: a PLY or OBJ file.",
         rule: Rule::path(),
-        columns: ["_"; 4],
+        columns: ["_"; 5],
     },
     Key {
         section: "data.keyframe",
         field: "time",
         doc: "Its time, in any unit.",
         rule: Rule::number(-1e9, 1e9),
-        columns: ["_"; 4],
+        columns: ["_"; 5],
     },
     Key {
         section: "data.keyframe",
         field: "correspondences",
         doc: "What is known of which of its points correspond to those of the next key frame.",
         rule: Rule::word_or_path(Correspondences::WORDS),
-        columns: ["_"; 4],
+        columns: ["_"; 5],
     },
 ];

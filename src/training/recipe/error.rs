@@ -67,6 +67,16 @@ pub enum RecipeError {
         /// Where the other value comes from.
         place: String,
     },
+    /// Steps of training where there are steps of a solver.
+    #[error("{at}: at most {most} with {kind}; set preset = \"instant\" for 18")]
+    TooManySteps {
+        /// File, line, key and value, override, or the preset.
+        at: String,
+        /// How many are allowed.
+        most: usize,
+        /// The key that makes them steps of a solver.
+        kind: String,
+    },
     /// The method has nothing to learn from.
     #[error("{at}: the method \"{method}\" {need}; {cure}, or choose another method.name")]
     Lacking {

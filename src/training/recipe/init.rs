@@ -10,7 +10,7 @@ use super::rule::Value;
 use super::schema::{Key, Section};
 use super::setting::Setting;
 use super::source::unicode;
-use super::words::{Correspondences, GeometryKind, Preset};
+use super::words::{Correspondences, GeometryKind, Preset, VelocityKind};
 use super::{Recipe, RecipeError, catalogue};
 use crate::method::{self, METHODS, MethodSpec};
 
@@ -19,7 +19,7 @@ const FIRST: [(&str, &str); 10] = [
     (
         "preset",
         "Quality against time. Every key that is left out has the preset's value. On two cores \
-         \"quick\" takes about one minute, \"default\" about ten minutes, \"quality\" about an hour. \
+         \"instant\" takes about ten seconds, \"quick\" takes about one minute, \"default\" about ten minutes, \"quality\" about an hour. \
          \"paper\" is the method as the paper prints it, and takes hours.",
     ),
     (
@@ -107,7 +107,9 @@ impl Recipe {
         text.push('\n');
         for (id, meaning) in FIRST {
             let key = catalogue::by_id(id).expect("a key of the table");
-            text.push_str(&page.line(key, meaning));
+            if page.spec.acts_on(key) {
+                text.push_str(&page.line(key, meaning));
+            }
         }
         let rest = format!("The other keys of the method {}", page.spec.described());
         text.push_str(&title(&rest));
@@ -128,10 +130,13 @@ fn chosen(preset: Preset) -> &'static MethodSpec {
     let geometry = catalogue::by_id("implicit.geometry").and_then(value);
     let geometry = geometry.and_then(GeometryKind::from_value);
     let geometry = geometry.expect("every preset gives it");
+    let kind = catalogue::by_id("velocity.kind").and_then(value);
+    let kind = kind.and_then(VelocityKind::from_value);
+    let kind = kind.expect("every preset gives it");
     let Some(Value::Text(name)) = value(catalogue::method()) else {
         unreachable!("every preset names a method");
     };
-    method::spec(&name, geometry).expect("a name of the list")
+    method::spec(&name, geometry, kind).expect("a name of the list")
 }
 
 /// What a printed recipe depends on.
@@ -185,7 +190,7 @@ impl Page {
             let keys = section
                 .keys
                 .iter()
-                .filter(|key| wanted(key) && !is_first(key));
+                .filter(|key| wanted(key) && !(is_first(key) && self.spec.acts_on(key)));
             let lines = keys.map(|key| self.line(key, &(first(key) + key.doc)));
             let lines: String = lines.collect();
             if !lines.is_empty() {

@@ -69,7 +69,7 @@ pub use keys::{
 };
 pub use words::{
     Activation, Correspondences, DERIVATIVES, GeometryKind, INTEGRATORS, LevelSetForm,
-    NormalSource, Preset, Schedule, TimeSampling,
+    NormalSource, Preset, Schedule, TimeSampling, VelocityKind,
 };
 
 use rule::Value;
@@ -105,7 +105,7 @@ pub struct Recipe {
 /// What is trained.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MethodRecipe {
-    /// The method's name; with it, `implicit.geometry` says which method it is
+    /// The method's name; with it, `velocity.kind` and `implicit.geometry` say which method it is
     /// ([`crate::method::spec_of`]).
     pub name: &'static str,
 }

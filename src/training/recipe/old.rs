@@ -38,7 +38,7 @@ const fn removed(field: &'static str) -> Key {
         field,
         doc: "A term of version 0.1.",
         rule: Rule::positive_or_zero(),
-        columns: ["0"; 4],
+        columns: ["0"; 5],
     }
 }
 

@@ -12,7 +12,7 @@ use super::rule::Value;
 use super::schema::{Key, Keyed, Section};
 use super::setting::Setting;
 use super::source::Reading;
-use super::words::{GeometryKind, Preset};
+use super::words::{GeometryKind, Preset, VelocityKind};
 use super::{MethodRecipe, Recipe, acting, catalogue, consistency, frames, source};
 use crate::method::{self, MethodSpec};
 
@@ -89,8 +89,8 @@ impl Recipe {
         resolve(entries, Path::new("recipe"), None)
     }
 
-    /// Changes one key, given as `section.key=value` as in `--set`. A relative path is one from the
-    /// working directory. What the recipe says and the changed method does not use is dropped.
+    /// Changes one key, given as `section.key=value` as in `--set`. With another preset, all keys that had the
+    /// value of the old one have that of the new one. A relative path is one from the working directory. What the recipe says and the changed method does not use is dropped.
     ///
     /// # Errors
     /// For what [`Recipe::parse`] refuses; the recipe is then as it was.
@@ -112,10 +112,14 @@ impl Recipe {
         Ok(())
     }
 
-    /// Everything that the recipe says.
+    /// Everything that the recipe says. What has the preset's value is the preset's, so that another preset
+    /// brings its own.
     fn held(&self) -> Entries {
         let held = |key, value| Entry::new(key, value, Place::Held);
-        let values = self.acting().into_iter();
+        let own = |(key, value): &(&'static Key, Value)| {
+            key.preset_value(self.preset).as_ref() != Some(value)
+        };
+        let values = self.acting().into_iter().filter(own);
         let mut entries: Entries = values
             .map(|(key, value)| (key.id(), held(key, value)))
             .collect();
@@ -162,10 +166,12 @@ fn chosen(value: impl Fn(&Key) -> Option<Value>) -> &'static MethodSpec {
     let word = |key: &Key| value(key).expect("every preset gives it");
     let geometry = catalogue::by_id("implicit.geometry").expect("a key of the table");
     let geometry = GeometryKind::from_value(word(geometry)).expect("it has passed its rule");
+    let kind = catalogue::by_id("velocity.kind").expect("a key of the table");
+    let kind = VelocityKind::from_value(word(kind)).expect("it has passed its rule");
     let Value::Text(name) = word(catalogue::method()) else {
         unreachable!("a word is text");
     };
-    method::spec(&name, geometry).expect("the name has passed its rule")
+    method::spec(&name, geometry, kind).expect("the name has passed its rule")
 }
 
 /// The typed recipe; keys without an entry have the preset's value.

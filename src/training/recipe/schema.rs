@@ -15,8 +15,8 @@ pub(crate) struct Key {
     pub(crate) doc: &'static str,
     /// What it accepts.
     pub(crate) rule: Rule,
-    /// TOML for quick, default, quality and paper; `_` where only the user can know.
-    pub(crate) columns: [&'static str; 4],
+    /// TOML for instant, quick, default, quality and paper; `_` where only the user can know.
+    pub(crate) columns: [&'static str; 5],
 }
 
 impl Key {
@@ -35,8 +35,9 @@ impl Key {
 
     /// The value that a preset gives, as TOML; `None` where the recipe must give one.
     pub(crate) fn column(&self, preset: Preset) -> Option<&'static str> {
-        let [quick, default, quality, paper] = self.columns;
+        let [instant, quick, default, quality, paper] = self.columns;
         let text = match preset {
+            Preset::Instant => instant,
             Preset::Quick => quick,
             Preset::Default => default,
             Preset::Quality => quality,
@@ -76,7 +77,7 @@ pub(crate) trait Keyed: Sized {
     fn to_values(&self) -> Vec<Option<Value>>;
 }
 
-/// Declares one section of keys, each with its type, its four preset columns and its rule. A doc
+/// Declares one section of keys, each with its type, its five preset columns and its rule. A doc
 /// comment becomes both the field's documentation and the comment in the TOML.
 macro_rules! section {
     (
@@ -84,7 +85,7 @@ macro_rules! section {
         $section:ident: $Section:ident {
             $(
                 $(#[doc = $doc:literal])+
-                $field:ident: $type:ty = $quick:tt | $default:tt | $quality:tt | $paper:tt, $rule:expr;
+                $field:ident: $type:ty = $instant:tt | $quick:tt | $default:tt | $quality:tt | $paper:tt, $rule:expr;
             )+
         }
     ) => {
@@ -95,8 +96,8 @@ macro_rules! section {
             $(
                 $(#[doc = $doc])+
                 #[doc = concat!(
-                    "\n\nPresets quick | default | quality | paper: `",
-                    stringify!($quick), " | ", stringify!($default), " | ",
+                    "\n\nPresets instant | quick | default | quality | paper: `",
+                    stringify!($instant), " | ", stringify!($quick), " | ", stringify!($default), " | ",
                     stringify!($quality), " | ", stringify!($paper),
                     "`; allowed: `", stringify!($rule), "`."
                 )]
@@ -116,6 +117,7 @@ macro_rules! section {
                             doc: concat!($($doc),+),
                             rule: $rule,
                             columns: [
+                                stringify!($instant),
                                 stringify!($quick),
                                 stringify!($default),
                                 stringify!($quality),

@@ -59,7 +59,9 @@ macro_rules! words {
 words! {
     /// Values of all keys that a recipe does not give.
     Preset {
-        /// A first result within minutes on a CPU.
+        /// A result within seconds on a CPU: splines, solved for.
+        Instant = "instant",
+        /// A first result of networks within minutes on a CPU.
         Quick = "quick",
         /// The balance of quality and time that the project recommends.
         Default = "default",
@@ -96,6 +98,14 @@ words! {
         Network = "network",
         /// Two end fields, carried by the flow of `V`.
         Flow = "flow",
+    }
+
+    /// What `V` is made of.
+    VelocityKind {
+        /// A network, which is trained.
+        Network = "network",
+        /// Splines, which are solved for.
+        Spline = "spline",
     }
 
     /// The form of the level-set equation.

@@ -101,7 +101,7 @@ fn no_two_kinds_of_sample_share_their_random_numbers() {
 fn the_parts_of_a_step_add_up_to_the_whole_in_every_method() {
     // As drawn for 88 points and 8 correspondences, all numbers are even.
     const OF: usize = 2;
-    for spec in METHODS {
+    for spec in trained() {
         let (data, name) = (data(), spec.described());
         let early = ["training.warm-up=0", "training.ramp-until=0"];
         let extra = if spec.is_baseline { &[][..] } else { &early };

@@ -97,6 +97,8 @@ fn what_a_recipe_prints_is_what_acts() {
             spec.geometry
                 .map(|kind| format!("implicit.geometry={kind}")),
         );
+        overrides.extend(spec.velocity.map(|kind| format!("velocity.kind={kind}")));
+        overrides.push("training.steps=18".to_owned());
         let overrides: Vec<&str> = overrides.iter().map(String::as_str).collect();
         let recipe = parsed(SHAPES, &overrides).expect(spec.name);
         assert_eq!(spec_of(&recipe), *spec);

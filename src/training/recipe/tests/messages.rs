@@ -29,7 +29,7 @@ data.source = ""
 data.correspondences = 'same'
     data.correspondences = 'same': must be "none", "same-vertices", "match" or the path of a file (folder/name.extension)
 preset = 'fast'
-    preset = 'fast': must be "quick", "default", "quality" or "paper"
+    preset = 'fast': must be "instant", "quick", "default", "quality" or "paper"
 loss = 5
     loss = 5: must be a section: [loss] on a line of its own, once
 checkpoint.evry = 5
@@ -45,7 +45,7 @@ steps = 5
 preste = 'quick'
     preste: no such key; did you mean preset? (above all sections stands preset)
 lss.data = 5
-    [lss]: no such section; did you mean loss? (a recipe has data, method, lipmlp, nise, eigenbasis, nfgp, implicit, velocity, loss, training, checkpoint, result)
+    [lss]: no such section; did you mean loss? (a recipe has data, method, spline, lipmlp, nise, eigenbasis, nfgp, implicit, velocity, loss, training, checkpoint, result)
 "#;
 
 #[test]
@@ -142,7 +142,7 @@ fn overrides_win_in_their_order_and_name_themselves_when_refused() {
         ),
         (
             "results.frames=5",
-            "no such section; did you mean result? (a recipe has data, method, lipmlp, nise, \
+            "no such section; did you mean result? (a recipe has data, method, spline, lipmlp, nise, \
              eigenbasis, nfgp, implicit, velocity, loss, training, checkpoint, result)",
         ),
     ] {
@@ -185,4 +185,20 @@ fn what_a_method_lacks_is_told_with_the_cure() {
     assert!(text.contains("data.correspondences = \"none\""), "{text}");
     assert!(text.contains("name a file of pairs there"), "{text}");
     assert!(parsed(SHAPES, &["method.name=lipmlp"]).is_ok());
+}
+
+#[test]
+fn steps_of_training_are_refused_where_a_solver_takes_them() {
+    let refused = |overrides: &[&str]| {
+        let error = parsed(SHAPES, overrides).expect_err("refused");
+        error.to_string()
+    };
+    let (kind, steps) = ("velocity.kind=spline", "training.steps=201");
+    let text = refused(&[kind]);
+    assert!(
+        text.contains("training.steps = 6000") && text.contains("at most 200"),
+        "{text}"
+    );
+    assert!(refused(&[kind, steps]).contains("preset = \"instant\""));
+    assert!(parsed(SHAPES, &[kind, "training.steps=200"]).is_ok());
 }

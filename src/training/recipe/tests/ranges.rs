@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::method::METHODS;
+use crate::recipe::VelocityKind;
 use crate::recipe::rule::Kind;
 
 /// Per key: what is admitted at the low end, refused below it, admitted at the high end, refused
@@ -10,6 +11,13 @@ const ENDS: &str = r#"
 data.keys                      [0,1]   [-1,1]   [9,10000000] [9,10000001]
 data.points                    64      63       10000000 10000001
 data.correspondence-fraction   1e-9    0        1        1.001
+spline.spacing                 0.01     0.009    1        1.001
+spline.coarse-share            0        -1e-9    1        1.001
+spline.band                    100      99       10000000 10000001
+spline.surface-samples         1        0        1000000  1000001
+spline.robust                  1e-9     0        1        1.001
+spline.iterations              1        0        10000    10001
+spline.tolerance               1e-9     0        1        1.001
 lipmlp.lipschitz               0        -1e-9    3e38     inf
 lipmlp.space-scale             1e-9     0        1000000  1000001
 nise.ends-until                1e-9     0        0.9      0.91
@@ -98,6 +106,10 @@ fn admitted(key: &'static Key, given: &str) -> Result<(), RecipeError> {
         spec.geometry
             .map(|kind| format!("implicit.geometry={kind}")),
     );
+    overrides.extend(spec.velocity.map(|kind| format!("velocity.kind={kind}")));
+    if spec.velocity == Some(VelocityKind::Spline) {
+        overrides.push("training.steps=18".to_owned());
+    }
     let acts = |change: &&&str| {
         let id = change.split('=').next().unwrap_or_default();
         spec.acts_on(catalogue::by_id(id).expect(id))

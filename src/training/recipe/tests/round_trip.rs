@@ -4,6 +4,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::method::METHODS;
+use crate::recipe::VelocityKind;
 use crate::recipe::rule::{Kind, Range};
 
 fn any_number(range: Range) -> BoxedStrategy<f64> {
@@ -46,6 +47,8 @@ fn any_recipe() -> impl Strategy<Value = (String, usize)> {
             let value = match key.id().as_str() {
                 "method.name" => word(spec.name),
                 "implicit.geometry" => word(spec.geometry.expect("it acts").word()),
+                "velocity.kind" => word(spec.velocity.expect("it acts").word()),
+                "training.steps" if spec.velocity == Some(VelocityKind::Spline) => Value::Whole(20),
                 // What some methods cannot do without.
                 "data.normals" if spec.needs.normals => word("auto"),
                 "data.correspondences" if spec.needs.correspondences => word("same-vertices"),
@@ -84,4 +87,19 @@ proptest! {
             prop_assert_eq!(error.to_string().lines().count(), 1);
         }
     }
+}
+
+#[test]
+fn another_preset_brings_its_own_values_and_leaves_what_was_chosen() {
+    let mut recipe = Recipe::between("a.ply", "b.ply").expect("two files");
+    recipe.with("loss.strain=7").expect("a key");
+    for (preset, steps, batch) in [(Preset::Quick, 1000, 2200), (Preset::Paper, 10_000, 4000)] {
+        recipe.with(&format!("preset={preset}")).expect("a preset");
+        let training = &recipe.training;
+        assert_eq!((training.steps, training.batch), (steps, batch), "{preset}");
+        assert_eq!(recipe.loss.strain, 7.0);
+    }
+    recipe.with("preset=instant").expect("a preset");
+    assert_eq!(recipe.velocity.kind, VelocityKind::Spline);
+    assert_eq!((recipe.training.steps, recipe.loss.strain), (18, 7.0));
 }

@@ -1,0 +1,309 @@
+//! The velocity field: `V(x, t) = sum_n sum_k c[n, k] B_n(x) T_k(t)`.
+//!
+//! | symbol | what |
+//! |---|---|
+//! | `B_n` | tensor products of quadratic B-splines on a [`Grid`] |
+//! | `T_k` | Legendre polynomials of time on `[0, 1]`, one or two ([`TimeBasis`]) |
+//! | `c` | the coefficients, `[node, k, axis]`, the node of the third axis fastest |
+//!
+//! A point outside the grid's box has the velocity of the nearest point in the box.
+
+use rayon::prelude::*;
+
+use crate::basis::{TimeBasis, halved};
+use crate::cell::{Jet, LANES, Node, first_three};
+use crate::error::SplineError;
+use crate::grid::Grid;
+use crate::real::{Fuse, Kernel, Real, run};
+use crate::trajectory::{Flow, Matrix, diagonal};
+
+/// Points that a thread takes at a time.
+const PIECE: usize = 256;
+
+/// A velocity field of quadratic B-splines.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SplineField<R: Real = f32> {
+    grid: Grid<R>,
+    basis: TimeBasis,
+    pub(crate) nodes: Vec<Node<R>>,
+}
+
+/// Where a point was carried.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Carried<R: Real = f32> {
+    /// The place.
+    pub point: [R; 3],
+    /// The derivative of the place by the point, `gradient[i][j] = d place_i / d point_j`.
+    pub gradient: [[R; 3]; 3],
+}
+
+impl<R: Real> SplineField<R> {
+    /// The field that is zero everywhere.
+    pub(crate) fn zero(grid: Grid<R>, basis: TimeBasis) -> Self {
+        let nodes = vec![Node::ZERO; grid.size()];
+        Self { grid, basis, nodes }
+    }
+
+    /// The field of these coefficients, as [`Self::coefficients`] gives them.
+    ///
+    /// # Errors
+    /// If the grid is none, or the coefficients are not finite or not as many as the grid's.
+    pub fn from_parts(
+        grid: Grid<R>,
+        basis: TimeBasis,
+        coefficients: &[R],
+    ) -> Result<Self, SplineError> {
+        let mut out = Self::zero(grid.checked()?, basis);
+        let wanted = out.nodes.len() * basis.functions() * 3;
+        if coefficients.len() != wanted {
+            return Err(SplineError::Lengths {
+                what: "coefficients",
+                found: coefficients.len(),
+                wanted,
+            });
+        }
+        if let Some(index) = coefficients.iter().position(|c| !c.wide().is_finite()) {
+            return Err(SplineError::Input {
+                what: "coefficient",
+                index,
+                found: format!("{:?}", coefficients[index]),
+                also: "",
+            });
+        }
+        let each = coefficients.chunks_exact(basis.functions() * 3);
+        for (node, values) in out.nodes.iter_mut().zip(each) {
+            for (k, values) in values.chunks_exact(3).enumerate() {
+                node.0[4 * k..4 * k + 3].copy_from_slice(values);
+            }
+        }
+        Ok(out)
+    }
+
+    /// The grid.
+    pub fn grid(&self) -> &Grid<R> {
+        &self.grid
+    }
+
+    /// The functions of time.
+    pub fn time_basis(&self) -> TimeBasis {
+        self.basis
+    }
+
+    /// The coefficients, `[nodes x, nodes y, nodes z, functions of time, 3]`.
+    pub fn coefficients(&self) -> Vec<R> {
+        let functions = self.basis.functions();
+        let of = |node: &Node<R>| {
+            let node = node.0;
+            (0..functions).flat_map(move |k| [node[4 * k], node[4 * k + 1], node[4 * k + 2]])
+        };
+        self.nodes.iter().flat_map(of).collect()
+    }
+
+    /// Whether all coefficients are finite.
+    pub(crate) fn is_finite(&self) -> bool {
+        let finite = |node: &Node<R>| node.0.iter().all(|c| c.wide().is_finite());
+        self.nodes.iter().all(finite)
+    }
+
+    pub(crate) fn flow(&self) -> Flow<'_, R> {
+        Flow {
+            grid: &self.grid,
+            strides: self.grid.strides(),
+            nodes: &self.nodes,
+            basis: self.basis,
+        }
+    }
+
+    /// V at each point, at one time.
+    pub fn values(&self, points: &[[R; 3]], t: R) -> Vec<[R; 3]> {
+        let times = vec![t; points.len()];
+        let jets = self.jets(points, &times);
+        jets.into_iter().map(|jet| jet.value).collect()
+    }
+
+    /// V, its rate and its Jacobian at each point, each at its own time.
+    ///
+    /// # Panics
+    /// If there is not one time for each point.
+    pub fn jets(&self, points: &[[R; 3]], times: &[R]) -> Vec<Jet<R>> {
+        same_length(points, times);
+        let zero = Jet {
+            value: [R::ZERO; 3],
+            rate: [R::ZERO; 3],
+            jacobian: [[R::ZERO; 3]; 3],
+        };
+        let mut out = vec![zero; points.len()];
+        let pieces = out.par_chunks_mut(PIECE).zip(points.par_chunks(PIECE));
+        pieces
+            .zip(times.par_chunks(PIECE))
+            .for_each(|((out, points), times)| {
+                run(Jets {
+                    flow: self.flow(),
+                    points,
+                    times,
+                    out,
+                });
+            });
+        out
+    }
+
+    /// Where the points at time `from` are carried to at time `to`, by `steps` steps.
+    ///
+    /// # Panics
+    /// If there are no steps.
+    pub fn carry(&self, points: &[[R; 3]], from: R, to: R, steps: usize) -> Vec<[R; 3]> {
+        let times = |t: R| vec![t; points.len()];
+        self.carry_each(points, &times(from), &times(to), steps)
+    }
+
+    /// [`Self::carry`] with times of their own for each point.
+    ///
+    /// # Panics
+    /// If there is not one time for each point in `from` and `to`, or no steps.
+    pub fn carry_each(&self, points: &[[R; 3]], from: &[R], to: &[R], steps: usize) -> Vec<[R; 3]> {
+        same_length(points, from);
+        same_length(points, to);
+        assert!(steps > 0, "trajectories of no steps");
+        let mut out = points.to_vec();
+        out.par_chunks_mut(PIECE)
+            .zip(from.par_chunks(PIECE).zip(to.par_chunks(PIECE)))
+            .for_each(|(points, (from, to))| {
+                let mut idle = R::ZERO;
+                run(Carry {
+                    flow: self.flow(),
+                    from,
+                    to,
+                    steps,
+                    points,
+                    idle: &mut idle,
+                });
+                debug_assert!(idle == R::ZERO || !idle.wide().is_finite());
+            });
+        out
+    }
+
+    /// Where the points are carried, and the exact derivative of these steps by the points.
+    ///
+    /// # Panics
+    /// If there are no steps.
+    pub fn carry_with_gradient(
+        &self,
+        points: &[[R; 3]],
+        from: R,
+        to: R,
+        steps: usize,
+    ) -> Vec<Carried<R>> {
+        assert!(steps > 0, "trajectories of no steps");
+        let start = |&point: &[R; 3]| Carried {
+            point,
+            gradient: diagonal(R::ONE),
+        };
+        let mut out: Vec<Carried<R>> = points.iter().map(start).collect();
+        out.par_chunks_mut(PIECE).for_each(|points| {
+            run(CarryWithGradient {
+                flow: self.flow(),
+                times: [from, to],
+                steps,
+                points,
+            });
+        });
+        out
+    }
+
+    /// The same field on a grid of half the spacing.
+    ///
+    /// # Errors
+    /// If that grid has too many nodes.
+    pub fn refined(&self) -> Result<Self, SplineError> {
+        let mut out = Self::zero(self.grid.halved()?, self.basis);
+        let [coarse_y, coarse_z] = self.grid.strides();
+        let [_, ny, nz] = out.grid.nodes();
+        let plane = ny * nz;
+        out.nodes
+            .par_chunks_mut(plane)
+            .enumerate()
+            .for_each(|(x, nodes)| {
+                let x = halved(x);
+                for (at, node) in nodes.iter_mut().enumerate() {
+                    let (y, z) = (halved(at / nz), halved(at % nz));
+                    let first = x.0 * coarse_y + y.0 * coarse_z + z.0;
+                    let mut sum = [0.0; LANES];
+                    for corner in 0..8 {
+                        let [a, b, c] = [corner >> 2, corner >> 1 & 1, corner & 1];
+                        let share = x.1[a] * y.1[b] * z.1[c];
+                        let coarse = &self.nodes[first + a * coarse_y + b * coarse_z + c];
+                        for (sum, value) in sum.iter_mut().zip(coarse.0) {
+                            *sum += share * value.wide();
+                        }
+                    }
+                    node.0 = sum.map(R::of);
+                }
+            });
+        Ok(out)
+    }
+}
+
+#[track_caller]
+fn same_length<A, B>(points: &[A], times: &[B]) {
+    assert_eq!(points.len(), times.len(), "one time for each point");
+}
+
+struct Jets<'a, R: Real> {
+    flow: Flow<'a, R>,
+    points: &'a [[R; 3]],
+    times: &'a [R],
+    out: &'a mut [Jet<R>],
+}
+
+impl<R: Real> Kernel for Jets<'_, R> {
+    #[inline(always)]
+    fn run<F: Fuse>(self, f: F) {
+        for ((out, &x), &t) in self.out.iter_mut().zip(self.points).zip(self.times) {
+            *out = self.flow.jet(f, x, t);
+        }
+    }
+}
+
+struct Carry<'a, R: Real> {
+    flow: Flow<'a, R>,
+    from: &'a [R],
+    to: &'a [R],
+    steps: usize,
+    points: &'a mut [[R; 3]],
+    /// The sum of the idle lanes: what keeps them.
+    idle: &'a mut R,
+}
+
+impl<R: Real> Kernel for Carry<'_, R> {
+    #[inline(always)]
+    fn run<F: Fuse>(self, f: F) {
+        let mut idle = R::ZERO;
+        for ((point, &from), &to) in self.points.iter_mut().zip(self.from).zip(self.to) {
+            let [x, y, z] = *point;
+            let end = self
+                .flow
+                .carry(f, [x, y, z, R::ZERO], [from, to], self.steps);
+            *point = first_three(end);
+            idle += end[3];
+        }
+        *self.idle = idle;
+    }
+}
+
+struct CarryWithGradient<'a, R: Real> {
+    flow: Flow<'a, R>,
+    times: [R; 2],
+    steps: usize,
+    points: &'a mut [Carried<R>],
+}
+
+impl<R: Real> Kernel for CarryWithGradient<'_, R> {
+    #[inline(always)]
+    fn run<F: Fuse>(self, f: F) {
+        for out in self.points {
+            let (point, gradient): ([R; 3], Matrix<R>) =
+                self.flow.gradient(f, out.point, self.times, self.steps);
+            *out = Carried { point, gradient };
+        }
+    }
+}

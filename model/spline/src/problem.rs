@@ -1,0 +1,104 @@
+//! Two shapes as points, and pairs of points known to correspond.
+
+use crate::error::SplineError;
+
+/// Samples of a surface.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Cloud {
+    /// Points, evenly over the surface; about 20,000 are plenty. Mean area of the shapes about 1.
+    pub points: Vec<[f32; 3]>,
+    /// The outward unit normal of each point, if known.
+    pub normals: Option<Vec<[f32; 3]>>,
+}
+
+/// Points of the first shape and where they are on the second.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Pairs {
+    /// Points of the first shape.
+    pub source: Vec<[f32; 3]>,
+    /// Where each is on the second.
+    pub target: Vec<[f32; 3]>,
+    /// A factor of each pair's weight, 0 or more; empty: 1 for all.
+    pub confidence: Vec<f32>,
+}
+
+/// What a field is sought for.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Problem {
+    /// The shape at time 0 and the shape at time 1.
+    pub shapes: [Cloud; 2],
+    /// Known correspondences; there may be none.
+    pub pairs: Pairs,
+}
+
+impl Problem {
+    /// # Errors
+    /// If a shape is empty, lists differ in length or a number is not finite.
+    pub(crate) fn check(&self) -> Result<(), SplineError> {
+        for (cloud, which) in self.shapes.iter().zip(["source", "target"]) {
+            if cloud.points.is_empty() {
+                return Err(SplineError::Empty { which });
+            }
+            check_finite("point", &cloud.points)?;
+            if let Some(normals) = &cloud.normals {
+                check_length("normals", normals.len(), cloud.points.len())?;
+                check_finite("normal", normals)?;
+            }
+        }
+        let pairs = &self.pairs;
+        check_length("pairs' targets", pairs.target.len(), pairs.source.len())?;
+        check_finite("pair's source", &pairs.source)?;
+        check_finite("pair's target", &pairs.target)?;
+        if !pairs.confidence.is_empty() {
+            check_length("confidence", pairs.confidence.len(), pairs.source.len())?;
+        }
+        let wrong = |&c: &f32| !(c.is_finite() && c >= 0.0);
+        if let Some(index) = pairs.confidence.iter().position(wrong) {
+            return Err(SplineError::Input {
+                what: "confidence",
+                index,
+                found: pairs.confidence[index].to_string(),
+                also: " and 0 or more",
+            });
+        }
+        Ok(())
+    }
+
+    /// The corners of the box of all points.
+    pub(crate) fn extent(&self) -> [[f64; 3]; 2] {
+        let (mut lower, mut upper) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        let [first, second] = &self.shapes;
+        let all = first.points.iter().chain(&second.points);
+        for point in all.chain(&self.pairs.source).chain(&self.pairs.target) {
+            for i in 0..3 {
+                lower[i] = lower[i].min(f64::from(point[i]));
+                upper[i] = upper[i].max(f64::from(point[i]));
+            }
+        }
+        [lower, upper]
+    }
+}
+
+fn check_length(what: &'static str, found: usize, wanted: usize) -> Result<(), SplineError> {
+    if found == wanted {
+        Ok(())
+    } else {
+        Err(SplineError::Lengths {
+            what,
+            found,
+            wanted,
+        })
+    }
+}
+
+fn check_finite(what: &'static str, points: &[[f32; 3]]) -> Result<(), SplineError> {
+    match points.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
+        None => Ok(()),
+        Some(index) => Err(SplineError::Input {
+            what,
+            index,
+            found: format!("{:?}", points[index]),
+            also: "",
+        }),
+    }
+}

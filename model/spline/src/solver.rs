@@ -1,0 +1,270 @@
+//! Gauss-Newton steps on grids that are halved.
+//!
+//! ```text
+//! minimise  matching + on-surface + strain + divergence + screw   over the coefficients
+//! step      A d = -gradient,  A = sum J^T W J + ridge I,   coefficients += d
+//! ```
+//!
+//! A step draws its samples by (seed, step) alone, so that a run resumed from any step goes on as it would
+//! have. A zero field is where it starts. The sums are the same on any number of threads.
+
+use crate::band;
+use crate::conjugate;
+use crate::ends::{EndTerms, Ends};
+use crate::error::SplineError;
+use crate::field::SplineField;
+use crate::grid::Grid;
+use crate::options::{Options, Weights};
+use crate::prior::PriorTerms;
+use crate::problem::Problem;
+use crate::real::Real;
+use crate::system::System;
+use crate::targets::{Surface, Targets};
+
+/// The terms of the objective at the present field, without their weights.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Terms {
+    /// Mean distance of pairs, both ways; 0 where there are none.
+    pub matching: f64,
+    /// Mean distance of carried samples from the other surface.
+    pub on_surface: f64,
+    /// Mean squared strain rate over the band.
+    pub strain: f64,
+    /// Mean absolute divergence over the band.
+    pub divergence: f64,
+    /// Mean squared deviation from a screw over the band.
+    pub screw: f64,
+}
+
+impl Terms {
+    /// The objective.
+    pub fn weighted(&self, weights: &Weights) -> f64 {
+        weights.matching * self.matching
+            + weights.on_surface * self.on_surface
+            + weights.strain * self.strain
+            + weights.divergence * self.divergence
+            + weights.screw * self.screw
+    }
+}
+
+/// What a step did.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StepReport {
+    /// The step, from 0 on.
+    pub step: usize,
+    /// The level, from 0 on.
+    pub level: usize,
+    /// The edge of the level's cells.
+    pub spacing: f64,
+    /// The terms before the step.
+    pub terms: Terms,
+    /// Iterations of conjugate gradients.
+    pub iterations: usize,
+    /// The largest change of a coefficient.
+    pub size: f64,
+    /// Points of the band after gathering.
+    pub band: usize,
+}
+
+/// Finds a field by Gauss-Newton steps.
+pub struct Solver<R: Real = f32> {
+    problem: Problem,
+    /// For the band, in the order of cells.
+    clouds: [Vec<[R; 3]>; 2],
+    surfaces: [Surface; 2],
+    weights: Weights,
+    options: Options,
+    grid: Grid<R>,
+    field: SplineField<R>,
+}
+
+impl<R: Real> Solver<R> {
+    /// Checks and arranges everything; the field is zero.
+    ///
+    /// # Errors
+    /// If the problem, a weight or an option is not valid.
+    pub fn new(problem: Problem, weights: Weights, options: Options) -> Result<Self, SplineError> {
+        problem.check()?;
+        weights.check()?;
+        options.check()?;
+        let [lower, upper] = problem.extent();
+        let grid = Grid::around(lower, upper, options.spacing, options.margin)?;
+        let mut finest = grid;
+        for _ in 1..options.steps.len() {
+            finest = finest.halved()?;
+        }
+        let [first, second] = &problem.shapes;
+        let (first, second) = rayon::join(|| Surface::new(first), || Surface::new(second));
+        let of = |x: f32| R::of(f64::from(x));
+        let cloud = |which: usize| -> Vec<[R; 3]> {
+            let points = &problem.shapes[which].points;
+            band::by_cell(points.iter().map(|point| point.map(of)).collect(), &finest)
+        };
+        Ok(Self {
+            clouds: [cloud(0), cloud(1)],
+            surfaces: [first, second],
+            field: SplineField::zero(grid, options.time),
+            problem,
+            weights,
+            options,
+            grid,
+        })
+    }
+
+    /// How many steps there are.
+    pub fn steps(&self) -> usize {
+        self.options.steps.iter().sum()
+    }
+
+    /// The present field.
+    pub fn field(&self) -> &SplineField<R> {
+        &self.field
+    }
+
+    /// The options.
+    pub fn options(&self) -> &Options {
+        &self.options
+    }
+
+    /// The weights.
+    pub fn weights(&self) -> &Weights {
+        &self.weights
+    }
+
+    /// Goes on from the field that the steps before `step` left: [`Self::advance`] of `step` is next.
+    ///
+    /// # Errors
+    /// If the field's grid or functions of time are not this solver's there.
+    pub fn resume_from(&mut self, field: SplineField<R>, step: usize) -> Result<(), SplineError> {
+        let wanted = self.grid_of(self.options.level(step.saturating_sub(1)))?;
+        if *field.grid() != wanted || field.time_basis() != self.options.time {
+            return Err(SplineError::Field {
+                step,
+                found: format!("{:?}, {:?}", field.grid(), field.time_basis()),
+                wanted: format!("{wanted:?}, {:?}", self.options.time),
+            });
+        }
+        self.field = field;
+        Ok(())
+    }
+
+    fn grid_of(&self, level: usize) -> Result<Grid<R>, SplineError> {
+        let mut grid = self.grid;
+        for _ in 0..level {
+            grid = grid.halved()?;
+        }
+        Ok(grid)
+    }
+
+    /// Takes a step; the first of a level begins by halving the grid. Steps are taken in order, from 0 on.
+    ///
+    /// # Errors
+    /// If there is no such step, the field is not on the grid of the step before, or a result is not
+    /// finite; the field is then as before.
+    pub fn advance(&mut self, step: usize) -> Result<StepReport, SplineError> {
+        if step >= self.steps() {
+            return Err(SplineError::Step {
+                step,
+                steps: self.steps(),
+            });
+        }
+        let level = self.options.level(step);
+        let grid = self.grid_of(level)?;
+        let mut field = self.field.clone();
+        while field.grid().cells[0] < grid.cells[0] {
+            field = field.refined()?;
+        }
+        if *field.grid() != grid {
+            return Err(SplineError::Field {
+                step,
+                found: format!("{:?}", field.grid()),
+                wanted: format!("{grid:?} or one coarser"),
+            });
+        }
+        let (mut system, terms) = self.linearise(&field, level, step, true)?;
+        let gradient = system.gradient(&field);
+        let options = &self.options;
+        let (most, tolerance) = (options.iterations, options.tolerance);
+        let solution = conjugate::solve(&mut system, &gradient, most, tolerance);
+        let (change, iterations) = solution.ok_or(SplineError::NotFinite {
+            step,
+            what: "the system",
+        })?;
+        let mut size = 0.0f64;
+        for (node, change) in field.nodes.iter_mut().zip(&change) {
+            for (value, change) in node.0.iter_mut().zip(change.0) {
+                *value += change;
+                size = size.max(change.wide().abs());
+            }
+        }
+        if !field.is_finite() {
+            let what = "the step";
+            return Err(SplineError::NotFinite { step, what });
+        }
+        self.field = field;
+        Ok(StepReport {
+            step,
+            level,
+            spacing: grid.spacing.wide(),
+            terms,
+            iterations,
+            size,
+            band: system.priors.places.len(),
+        })
+    }
+
+    /// What was given, for tests that write out the objective.
+    #[cfg(test)]
+    pub(crate) fn given(&self) -> (&Problem, &[Surface; 2], &[Vec<[R; 3]>; 2]) {
+        (&self.problem, &self.surfaces, &self.clouds)
+    }
+
+    /// The system at a field; `merge`: with places of trajectories merged.
+    pub(crate) fn linearise(
+        &self,
+        field: &SplineField<R>,
+        level: usize,
+        step: usize,
+        merge: bool,
+    ) -> Result<(System<R>, Terms), SplineError> {
+        let not_finite = |what| SplineError::NotFinite { step, what };
+        let (options, weights) = (&self.options, &self.weights);
+        let targets = Targets::new(&self.problem, options, weights, step);
+        let steps = options.trajectory_steps;
+        let ends = Ends::new(field, &targets.starts, &targets.times, steps, merge);
+        let finite = |x: &R| x.wide().is_finite();
+        if !ends.points.iter().flatten().all(finite) {
+            return Err(not_finite("the end of a trajectory"));
+        }
+        let residuals = targets.residuals(&ends, &self.surfaces, weights, options.robust_scale);
+        let mut terms = Terms {
+            matching: residuals.matching,
+            on_surface: residuals.on_surface,
+            ..Terms::default()
+        };
+        let end_terms = EndTerms::new(field, &ends, residuals.residuals, residuals.weights);
+
+        let last = level + 1 == options.steps.len();
+        let amount = if last {
+            options.band
+        } else {
+            options.band.div_ceil(2)
+        };
+        let samples = band::samples(field, &self.clouds, options, amount, step);
+        let finite = |x: &R| x.wide().is_finite();
+        if !samples.iter().flat_map(|sample| &sample.point).all(finite) {
+            return Err(not_finite("a point of the band"));
+        }
+        let priors = PriorTerms::new(field, &samples, weights);
+        terms.strain = priors.means.strain;
+        terms.divergence = priors.means.divergence;
+        terms.screw = priors.means.screw;
+        let objective = terms.weighted(weights);
+        if !objective.is_finite() {
+            return Err(not_finite("the objective"));
+        }
+        // A well-covered node has about 1/150 of the strain, over a squared spacing near 0.1 squared.
+        let ridge = options.ridge * weights.strain * 100.0 / 150.0;
+        Ok((System::new(field, end_terms, priors, ridge), terms))
+    }
+}

@@ -1,0 +1,239 @@
+//! The signed distance of a shape as it is, without training: what the flow carries with the preset "instant".
+//!
+//! Of a closed mesh it is exact, sharp edges included ([`TriangleSearch`]). Of a cloud, or of a mesh that is not
+//! closed, it is that of its points with normals ([`SignedDistance`]).
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::distance::SignedDistance;
+use super::keyframes::Keyframe;
+use crate::geometry::linear::{cross, difference, unit};
+use crate::geometry::{Mesh, TriangleSearch};
+
+/// Queries that a core takes at a time: near ones together, since the last answer starts the next search.
+const AT_A_TIME: usize = 512;
+
+/// Closer to the surface than this, in normalised units, its own normal is the gradient: rounding.
+const ON_SURFACE: f32 = 1e-5;
+
+/// Places at which a mesh is searched for parts that lie inside others.
+const LOOKED_AT: usize = 4000;
+
+/// How far outside of a surface these places are, in normalised units.
+const OUTSIDE: f32 = 1e-3;
+
+/// What a signed distance is made from: all that a checkpoint has to hold of a shape. Normalised.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct SolidParts {
+    /// The vertices of a closed mesh, or points.
+    pub points: Vec<[f32; 3]>,
+    /// The triangles of a closed mesh; none of a cloud.
+    pub triangles: Vec<[u32; 3]>,
+    /// Unit normals of a cloud's points; none of a mesh.
+    pub normals: Vec<[f32; 3]>,
+}
+
+impl SolidParts {
+    /// Of a key frame; `None` if it is neither a closed mesh nor has normals.
+    pub(crate) fn of(key: &Keyframe) -> Option<Self> {
+        if let Some(mesh) = &key.mesh {
+            return Some(Self {
+                points: mesh.vertices.clone(),
+                triangles: mesh.triangles.clone(),
+                normals: Vec::new(),
+            });
+        }
+        Some(Self {
+            points: key.cloud.points.clone(),
+            triangles: Vec::new(),
+            normals: key.cloud.normals.clone()?,
+        })
+    }
+
+    /// Whether the numbers fit together: what a damaged file need not.
+    fn is_whole(&self) -> bool {
+        let count = self.points.len();
+        let finite = |rows: &[[f32; 3]]| rows.as_flattened().iter().all(|part| part.is_finite());
+        let named = self.triangles.as_flattened().iter();
+        count > 0
+            && finite(&self.points)
+            && finite(&self.normals)
+            && named.clone().all(|&index| (index as usize) < count)
+            && (!self.triangles.is_empty() || self.normals.len() == count)
+    }
+}
+
+/// A shape with its signed distance.
+pub(crate) struct Solid {
+    parts: SolidParts,
+    kind: Kind,
+}
+
+enum Kind {
+    Mesh {
+        search: TriangleSearch,
+        /// Whether parts of it lie inside others.
+        overlaps: bool,
+    },
+    Cloud(Box<SignedDistance>),
+}
+
+impl Solid {
+    /// Arranged for queries; `None` if the parts do not fit together or have no area.
+    pub(crate) fn new(parts: SolidParts) -> Option<Self> {
+        if !parts.is_whole() {
+            return None;
+        }
+        let kind = if parts.triangles.is_empty() {
+            Kind::Cloud(Box::new(SignedDistance::new(&parts.points, &parts.normals)))
+        } else {
+            let mesh = Mesh::new(parts.points.clone(), parts.triangles.clone());
+            let search = TriangleSearch::new(&mesh)?;
+            let overlaps = overlaps(&search);
+            Kind::Mesh { search, overlaps }
+        };
+        Some(Self { parts, kind })
+    }
+
+    /// What it is made from.
+    pub(crate) fn parts(&self) -> &SolidParts {
+        &self.parts
+    }
+
+    /// The signed distance at each of the places, negative inside.
+    pub(crate) fn distances(&self, places: &[[f32; 3]]) -> Vec<f32> {
+        let chunks = places.par_chunks(AT_A_TIME);
+        let found = chunks.map(|chunk| match &self.kind {
+            Kind::Mesh { search, overlaps } => {
+                let mut near = 0;
+                let at = |&x: &[f32; 3]| {
+                    let closest = search.closest(x, near);
+                    near = closest.triangle;
+                    let inside = if *overlaps {
+                        search.winding(x) > 0.5
+                    } else {
+                        search.is_behind(&closest, x)
+                    };
+                    signed(closest.squared.sqrt(), inside)
+                };
+                chunk.iter().map(at).collect()
+            }
+            Kind::Cloud(distance) => chunk.iter().map(|&x| distance.at(x)).collect::<Vec<f32>>(),
+        });
+        found.collect::<Vec<_>>().concat()
+    }
+
+    /// The unit gradient of the signed distance at each of the places.
+    pub(crate) fn gradients(&self, places: &[[f32; 3]]) -> Vec<[f32; 3]> {
+        let at = |&x: &[f32; 3]| match &self.kind {
+            Kind::Mesh { search, overlaps } => {
+                let closest = search.closest(x, 0);
+                let away = unit(difference(x, closest.point));
+                if closest.squared < ON_SURFACE * ON_SURFACE {
+                    unit(search.normal(&closest))
+                } else if *overlaps && search.winding(x) > 0.5
+                    || !*overlaps && search.is_behind(&closest, x)
+                {
+                    away.map(|part| -part)
+                } else {
+                    away
+                }
+            }
+            Kind::Cloud(distance) => distance.slope(x),
+        };
+        places.par_iter().with_min_len(AT_A_TIME).map(at).collect()
+    }
+}
+
+fn signed(distance: f32, inside: bool) -> f32 {
+    if inside { -distance } else { distance }
+}
+
+/// Whether some of the surface lies inside another part of it: places just outside of it are not outside.
+fn overlaps(search: &TriangleSearch) -> bool {
+    let corners = search.corners();
+    let some = corners
+        .par_iter()
+        .step_by(corners.len().div_ceil(LOOKED_AT));
+    some.any(|&[a, b, c]| {
+        let normal = unit(cross(difference(b, a), difference(c, a)));
+        let before = |axis: usize| (a[axis] + b[axis] + c[axis]) / 3.0 + OUTSIDE * normal[axis];
+        search.winding([0, 1, 2].map(before)) > 0.5
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::testing::{bumpy_sphere, random_places};
+
+    fn parts(mesh: &Mesh<f64>) -> SolidParts {
+        SolidParts {
+            points: mesh
+                .vertices
+                .iter()
+                .map(|x| x.map(|part| part as f32))
+                .collect(),
+            triangles: mesh.triangles.clone(),
+            normals: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn distances_of_a_mesh_are_exact_and_their_gradients_lead_to_the_surface() {
+        let solid = Solid::new(parts(&bumpy_sphere(40))).expect("a solid");
+        let places = random_places(400, 0.8, 1);
+        let (distances, gradients) = (solid.distances(&places), solid.gradients(&places));
+        let inside = distances.iter().filter(|d| **d < 0.0).count();
+        assert!((20..200).contains(&inside), "{inside} inside");
+        let moved = places.iter().zip(distances.iter().zip(&gradients));
+        let onto: Vec<[f32; 3]> = moved
+            .map(|(x, (d, g))| [0, 1, 2].map(|axis| x[axis] - d * g[axis]))
+            .collect();
+        for left in solid.distances(&onto) {
+            assert!(left.abs() < 2e-6, "{left}");
+        }
+    }
+
+    #[test]
+    fn a_part_inside_another_makes_no_surface_of_its_own() {
+        let mut mesh = bumpy_sphere(24);
+        let other = mesh.moved(|x| [x[0] + 0.3, x[1], x[2]]);
+        assert!(matches!(
+            Solid::new(parts(&mesh)).expect("a solid").kind,
+            Kind::Mesh {
+                overlaps: false,
+                ..
+            }
+        ));
+        let first = mesh.vertices.len() as u32;
+        mesh.vertices.extend(other.vertices);
+        let named = other.triangles.iter().map(|t| t.map(|index| index + first));
+        mesh.triangles.extend(named);
+        let both = Solid::new(parts(&mesh)).expect("a solid");
+        // Along the middle: inside from one end to the other.
+        for k in 0..100 {
+            let x = [-0.35 + 0.01 * k as f32, 0.01, 0.02];
+            assert!(both.distances(&[x])[0] < 0.0, "at {x:?}");
+        }
+    }
+
+    #[test]
+    fn parts_that_do_not_fit_together_make_none() {
+        let good = parts(&bumpy_sphere(8));
+        let mut wrong = good.clone();
+        wrong.triangles[0][0] = 10_000;
+        assert!(Solid::new(wrong).is_none());
+        let mut wrong = good.clone();
+        wrong.points[0][0] = f32::NAN;
+        assert!(Solid::new(wrong).is_none());
+        assert!(
+            Solid::new(SolidParts {
+                triangles: Vec::new(),
+                ..good
+            })
+            .is_none()
+        );
+    }
+}

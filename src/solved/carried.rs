@@ -1,0 +1,173 @@
+//! Surfaces and motion of a solved field:
+//!
+//! ```text
+//! f(x, t) = (1 - t) g(phi_{t -> 0}(x)) + t h(phi_{t -> 1}(x))
+//! ```
+//!
+//! as with the default method, `g` and `h` being the signed distances of the shapes themselves.
+
+use std::sync::Arc;
+
+use isomorph_spline::SplineField;
+use isomorph_training::deformation::{CarriedField, Deformation, PointMotion, SurfaceField};
+
+use crate::shape::Solid;
+use crate::surface::learned::some_of;
+
+/// How exactly points are followed, in normalised units: a fifth of a cell at 256 cells to a side.
+const TOLERANCE: f64 = 1e-3;
+
+/// The most steps of the integrator over all of time.
+const MOST_STEPS: usize = 32;
+
+/// Points of each shape that decide how many steps it takes.
+const PROBES: usize = 2000;
+
+/// Two shapes and the field that carries them.
+pub(super) struct CarriedShapes {
+    field: SplineField,
+    shapes: Arc<[Solid; 2]>,
+    /// Of the Runge-Kutta integrator over all of time.
+    steps: usize,
+}
+
+impl CarriedShapes {
+    pub(super) fn new(field: SplineField, shapes: Arc<[Solid; 2]>) -> Self {
+        let steps = needed(&field, &shapes);
+        Self {
+            field,
+            shapes,
+            steps,
+        }
+    }
+
+    /// The share of the steps that a span of time has.
+    fn share(&self, from: f64, to: f64) -> usize {
+        (((to - from).abs() * self.steps as f64).ceil() as usize).max(1)
+    }
+
+    fn carry_to(&self, points: &[[f32; 3]], from: f64, to: f64) -> Vec<[f32; 3]> {
+        let steps = self.share(from, to);
+        self.field.carry(points, from as f32, to as f32, steps)
+    }
+}
+
+/// The least number of steps at which all but a twentieth of the probes end within the tolerance of where twice
+/// the steps take them.
+fn needed(field: &SplineField, shapes: &[Solid; 2]) -> usize {
+    let mut steps = 2;
+    for (shape, [from, to]) in shapes.iter().zip([[0.0, 1.0], [1.0, 0.0]]) {
+        let probes = some_of(&shape.parts().points, PROBES);
+        let mut ends = field.carry(&probes, from, to, steps);
+        while steps < MOST_STEPS {
+            let finer = field.carry(&probes, from, to, 2 * steps);
+            let far = ends.iter().zip(&finer).filter(|(a, b)| {
+                let squared = (0..3).map(|i| (a[i] - b[i]) * (a[i] - b[i])).sum::<f32>();
+                f64::from(squared) > TOLERANCE * TOLERANCE
+            });
+            if far.count() * 20 <= probes.len() {
+                break;
+            }
+            steps *= 2;
+            ends = finer;
+        }
+    }
+    steps
+}
+
+impl Deformation for CarriedShapes {
+    fn field(&self) -> Option<&dyn SurfaceField> {
+        Some(self)
+    }
+
+    fn motion(&self) -> Option<&dyn PointMotion> {
+        Some(self)
+    }
+}
+
+impl SurfaceField for CarriedShapes {
+    fn values(&self, points: &[[f32; 3]], time: f64) -> Vec<f32> {
+        self.values_from(&self.ends(points, time), time)
+    }
+
+    /// The gradient of each distance where the point comes from, carried back by the transpose of the motion's
+    /// derivative: that of the integrator's own steps, so that it is the gradient of [`Self::values`].
+    fn gradients(&self, points: &[[f32; 3]], time: f64) -> Vec<[f32; 3]> {
+        let [g, h] = [0.0, 1.0].map(|end| {
+            let shape = &self.shapes[usize::from(end > 0.5)];
+            let steps = self.share(time, end);
+            let there = self
+                .field
+                .carry_with_gradient(points, time as f32, end as f32, steps);
+            let places: Vec<[f32; 3]> = there.iter().map(|carried| carried.point).collect();
+            let slopes = shape.gradients(&places).into_iter();
+            let back = slopes
+                .zip(&there)
+                .map(|(n, carried)| transposed(&carried.gradient, n));
+            back.collect::<Vec<_>>()
+        });
+        let t = time as f32;
+        let blend = |(g, h): (&[f32; 3], &[f32; 3])| [0, 1, 2].map(|i| (1.0 - t) * g[i] + t * h[i]);
+        g.iter().zip(&h).map(blend).collect()
+    }
+
+    fn carried(&self) -> Option<&dyn CarriedField> {
+        Some(self)
+    }
+}
+
+impl CarriedField for CarriedShapes {
+    fn tolerance(&self) -> f64 {
+        TOLERANCE
+    }
+
+    fn ends(&self, points: &[[f32; 3]], time: f64) -> Vec<[f32; 6]> {
+        let [start, end] = [0.0, 1.0].map(|end| self.carry_to(points, time, end));
+        let both = |(a, b): (&[f32; 3], &[f32; 3])| [a[0], a[1], a[2], b[0], b[1], b[2]];
+        start.iter().zip(&end).map(both).collect()
+    }
+
+    fn values_from(&self, ends: &[[f32; 6]], time: f64) -> Vec<f32> {
+        let t = time as f32;
+        let of = |end: usize| {
+            // What has no weight is not computed.
+            if (end == 0 && t >= 1.0) || (end == 1 && t <= 0.0) {
+                return vec![0.0; ends.len()];
+            }
+            let place = |both: &[f32; 6]| [0, 1, 2].map(|axis| both[3 * end + axis]);
+            let places: Vec<[f32; 3]> = ends.iter().map(place).collect();
+            self.shapes[end].distances(&places)
+        };
+        let (g, h) = (of(0), of(1));
+        g.iter()
+            .zip(&h)
+            .map(|(g, h)| (1.0 - t) * g + t * h)
+            .collect()
+    }
+}
+
+impl PointMotion for CarriedShapes {
+    fn carry(&self, points: &[[f32; 3]], from: f64, to: f64) -> Vec<[f32; 3]> {
+        self.carry_to(points, from, to)
+    }
+
+    fn path(&self, start: &[[f32; 3]], times: &[f64]) -> Vec<Vec<[f32; 3]>> {
+        let (mut at, mut now) = (start.to_vec(), 0.0);
+        let mut next = |&time: &f64| {
+            if time > now {
+                at = self.carry_to(&at, now, time);
+                now = time;
+            }
+            at.clone()
+        };
+        times.iter().map(&mut next).collect()
+    }
+
+    fn velocities(&self, points: &[[f32; 3]], time: f64) -> Vec<[f32; 3]> {
+        self.field.values(points, time as f32)
+    }
+}
+
+fn transposed(m: &[[f32; 3]; 3], x: [f32; 3]) -> [f32; 3] {
+    [0, 1, 2].map(|j| m[0][j] * x[0] + m[1][j] * x[1] + m[2][j] * x[2])
+}

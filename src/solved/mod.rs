@@ -1,0 +1,256 @@
+//! What is solved for instead of trained (`velocity.kind = "spline"`): a field of splines that carries the
+//! shapes themselves.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | `mod.rs` | [`Solved`], which makes one step of Gauss-Newton where others make one of an optimiser |
+//! | `carried.rs` | surfaces and motion of its field |
+//! | `stored.rs` | its part of a checkpoint |
+//!
+//! The mathematics is in the package `isomorph-spline`, the distance of a shape in [`crate::shape`].
+
+mod carried;
+mod stored;
+#[cfg(test)]
+mod tests;
+
+use std::io;
+use std::sync::Arc;
+
+use isomorph_spline::{
+    Cloud, Options, Pairs, Problem, Solver, SplineField, Terms, TimeBasis, Weights,
+};
+use isomorph_training::data::TrainingData;
+use isomorph_training::deformation::Deformation;
+use isomorph_training::engine::Trainer;
+use isomorph_training::method::spline;
+use isomorph_training::records::{RecordError, Records};
+use isomorph_training::report::{Phase, Rates, TermReport};
+
+use self::carried::CarriedShapes;
+use crate::recipe::Recipe;
+use crate::shape::{Keyframe, Keyframes, Solid, SolidParts};
+
+/// A field of splines between two shapes, solved for step by step.
+pub(crate) struct Solved {
+    /// What makes the steps; none of a run that is only looked at.
+    solver: Option<Solver>,
+    /// The field and the shapes, once there are any.
+    state: Option<State>,
+    weights: Weights,
+}
+
+/// Least weight of the strain: without any the field would be free between the samples.
+const LEAST_STRAIN: f64 = 1e-3;
+
+/// What a checkpoint holds.
+struct State {
+    field: SplineField,
+    /// Steps done.
+    step: usize,
+    shapes: Arc<[Solid; 2]>,
+}
+
+impl Solved {
+    /// Before the first step.
+    ///
+    /// # Errors
+    /// If a shape is neither a closed mesh nor has normals, or the solver refuses the problem.
+    pub(crate) fn new(recipe: &Recipe, keyframes: &Keyframes) -> Result<Self, String> {
+        let [first, last] = &keyframes.keys[..] else {
+            return Err(format!(
+                "velocity.kind = \"spline\": takes two shapes, not {}",
+                keyframes.keys.len()
+            ));
+        };
+        let (source, target) = (solid(first, "source")?, solid(last, "target")?);
+        let weights = weights(recipe);
+        let problem = problem(recipe, keyframes);
+        let solver = Solver::new(problem, weights, options(recipe));
+        let solver = solver.map_err(|error| format!("velocity.kind = \"spline\": {error}"))?;
+        Ok(Self {
+            state: Some(State {
+                field: solver.field().clone(),
+                step: 0,
+                shapes: Arc::new([source, target]),
+            }),
+            solver: Some(solver),
+            weights,
+        })
+    }
+
+    /// Without shapes, to take those of a checkpoint.
+    pub(crate) fn unset(recipe: &Recipe) -> Self {
+        Self {
+            solver: None,
+            state: None,
+            weights: weights(recipe),
+        }
+    }
+
+    fn state(&self) -> &State {
+        let state = self.state.as_ref();
+        state.expect("a run is looked at after its checkpoint is read")
+    }
+}
+
+impl Trainer for Solved {
+    fn advance(&mut self, _: &TrainingData, step: usize, read: bool) -> Option<Vec<TermReport>> {
+        let solver = self.solver.as_mut();
+        let solver = solver.expect("a run that is only looked at is not trained");
+        let Weights {
+            matching,
+            on_surface,
+            strain,
+            divergence,
+            screw,
+        } = self.weights;
+        let term = |name, weight: f64, raw: f64| TermReport {
+            name,
+            raw,
+            weighted: weight * raw,
+        };
+        match solver.advance(step) {
+            Ok(report) => {
+                let Terms {
+                    matching: matched,
+                    on_surface: arrived,
+                    strain: strained,
+                    divergence: diverged,
+                    screw: unsteady,
+                } = report.terms;
+                if let Some(state) = &mut self.state {
+                    state.field = solver.field().clone();
+                    state.step = step + 1;
+                }
+                read.then(|| {
+                    vec![
+                        term("matching", matching, matched),
+                        term("on-surface", on_surface, arrived),
+                        term("strain", strain, strained),
+                        term("divergence", divergence, diverged),
+                        term("screw", screw, unsteady),
+                    ]
+                })
+            }
+            // Reported as every term that is no number: training stops.
+            Err(_) => Some(vec![term("spline", 1.0, f64::NAN)]),
+        }
+    }
+
+    fn wait(&self) {}
+
+    fn phase(&self, _: usize) -> Phase {
+        Phase::Motion
+    }
+
+    fn rates(&self, _: usize) -> Rates {
+        Rates::default()
+    }
+
+    fn networks(&self) -> Vec<(&'static str, usize)> {
+        let count = self.state().field.coefficients().len();
+        vec![("V (spline)", count)]
+    }
+
+    fn records(&self) -> io::Result<Records> {
+        let State {
+            field,
+            step,
+            shapes,
+        } = self.state();
+        stored::records(field, *step, shapes)
+    }
+
+    fn restore(&mut self, records: &Records) -> Result<(), RecordError> {
+        let (field, step, parts) = stored::read(records)?;
+        if let Some(solver) = &mut self.solver {
+            let resumed = solver.resume_from(field.clone(), step);
+            resumed.map_err(|error| stored::misfit(&error))?;
+        }
+        let shapes = match self.state.take() {
+            Some(state) => state.shapes,
+            None => Arc::new(stored::shapes(parts)?),
+        };
+        self.state = Some(State {
+            field,
+            step,
+            shapes,
+        });
+        Ok(())
+    }
+
+    fn deformation(&self) -> Box<dyn Deformation> {
+        let State { field, shapes, .. } = self.state();
+        Box::new(CarriedShapes::new(field.clone(), Arc::clone(shapes)))
+    }
+}
+
+fn solid(key: &Keyframe, name: &str) -> Result<Solid, String> {
+    let parts = SolidParts::of(key).ok_or_else(|| {
+        format!(
+            "velocity.kind = \"spline\": the {name} has no normals and is no closed mesh; set data.normals \
+             to \"auto\", or choose the preset \"quick\""
+        )
+    })?;
+    let solid = Solid::new(parts);
+    solid.ok_or_else(|| format!("the {name} has no area"))
+}
+
+fn problem(recipe: &Recipe, keyframes: &Keyframes) -> Problem {
+    let cloud = |k: usize| {
+        let cloud = &keyframes.keys[k].cloud;
+        Cloud {
+            points: cloud.points.clone(),
+            normals: cloud.normals.clone(),
+        }
+    };
+    // At most so many, evenly chosen: they come in no order that means anything.
+    let known = &keyframes.between[0];
+    let apart = known
+        .len()
+        .div_ceil(recipe.training.correspondence_batch)
+        .max(1);
+    let (source, target) = known.iter().step_by(apart).copied().unzip();
+    Problem {
+        shapes: [cloud(0), cloud(1)],
+        pairs: Pairs {
+            source,
+            target,
+            confidence: Vec::new(),
+        },
+    }
+}
+
+fn weights(recipe: &Recipe) -> Weights {
+    let loss = &recipe.loss;
+    Weights {
+        matching: loss.matching,
+        on_surface: loss.on_surface,
+        strain: loss.strain.max(LEAST_STRAIN),
+        divergence: loss.divergence,
+        screw: loss.screw,
+    }
+}
+
+fn options(recipe: &Recipe) -> Options {
+    let (keys, training) = (spline::keys(recipe), &recipe.training);
+    let coarse = (training.steps as f64 * keys.coarse_share).round() as usize;
+    let mut steps = vec![coarse, training.steps - coarse];
+    steps.retain(|steps| *steps > 0);
+    Options {
+        // Of the first level; each further one halves it.
+        spacing: keys.spacing * if coarse > 0 { 2.0 } else { 1.0 },
+        steps,
+        time: TimeBasis::Linear,
+        trajectory_steps: training.time_steps,
+        band: keys.band,
+        band_spread: training.band_widths.clone(),
+        surface_samples: keys.surface_samples,
+        robust_scale: keys.robust,
+        iterations: keys.iterations,
+        tolerance: keys.tolerance,
+        seed: training.seed,
+        ..Options::default()
+    }
+}

@@ -1,0 +1,253 @@
+//! Solved fields as the rest of the program sees them: trained, stored, resumed, extracted.
+
+use isomorph_training::engine::Trainer;
+
+use super::*;
+use crate::geometry::testing::bumpy_sphere;
+use crate::geometry::{Bounds, Mesh};
+use crate::shape::{Normalisation, PointCloud};
+
+/// A bumpy sphere at two places, 0.2 apart along x and turned by `angle` about z, with all vertices as pairs.
+fn keyframes(angle: f32) -> Keyframes {
+    let first: Mesh<f32> = bumpy_sphere(30).moved(|x| x.map(|part| part as f32));
+    let (sin, cos) = angle.sin_cos();
+    let last = first.moved(|[x, y, z]| [cos * x - sin * y + 0.2, sin * x + cos * y, z]);
+    let key = |time: f64, mesh: &Mesh<f32>| Keyframe {
+        time,
+        cloud: PointCloud {
+            points: mesh.vertices.clone(),
+            normals: Some(mesh.vertex_normals()),
+        },
+        mesh: Some(mesh.clone()),
+    };
+    let pairs = first
+        .vertices
+        .iter()
+        .copied()
+        .zip(last.vertices.iter().copied());
+    let bounds = Bounds::of(&first.vertices).union(&Bounds::of(&last.vertices));
+    Keyframes {
+        between: vec![pairs.collect()],
+        keys: vec![key(0.0, &first), key(1.0, &last)],
+        normalisation: Normalisation {
+            centre: [0.0; 3],
+            scale: 1.0,
+        },
+        bounds,
+        notes: Vec::new(),
+    }
+}
+
+fn recipe(changes: &[&str]) -> Recipe {
+    let mut recipe = Recipe::between("a.ply", "b.ply").expect("two files");
+    let set = ["preset=instant", "training.steps=6", "spline.band=3000"];
+    let set = set.iter().chain(changes).map(|change| (*change).to_owned());
+    recipe.with_all(&set.collect::<Vec<_>>()).expect("a recipe");
+    recipe
+}
+
+fn trained(recipe: &Recipe, keyframes: &Keyframes) -> Solved {
+    let (mut solved, data) = (
+        Solved::new(recipe, keyframes).expect("shapes"),
+        keyframes.training_data(),
+    );
+    for step in 0..recipe.training.steps {
+        solved.advance(&data, step, false);
+    }
+    solved
+}
+
+#[test]
+fn the_surface_is_the_shape_where_the_motion_takes_it() {
+    let keyframes = keyframes(0.6);
+    let deformation = trained(&recipe(&[]), &keyframes).deformation();
+    let (field, motion) = (
+        deformation.field().expect("one"),
+        deformation.motion().expect("one"),
+    );
+    let source = &keyframes.keys[0].cloud.points;
+    let target = &keyframes.keys[1].cloud.points;
+    for (time, points) in [(0.0, source), (1.0, target)] {
+        let off = field
+            .values(points, time)
+            .into_iter()
+            .map(f32::abs)
+            .fold(0.0, f32::max);
+        // On the shapes themselves it is their distance, exact in f32.
+        assert!(off < 1e-5, "at {time}: {off}");
+    }
+    let carried = motion.carry(source, 0.0, 0.5);
+    let off = field.values(&carried, 0.5).into_iter().map(f32::abs);
+    let mean = off.sum::<f32>() / carried.len() as f32;
+    assert!(mean < 1e-3, "{mean}");
+    let arrived = motion.path(source, &[0.3, 1.0]).remove(1);
+    let miss = arrived
+        .iter()
+        .zip(target)
+        .map(|(a, b)| (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f32>().sqrt());
+    let mean = miss.sum::<f32>() / arrived.len() as f32;
+    assert!(mean < 2e-3, "{mean}");
+}
+
+#[test]
+fn gradients_are_those_of_the_values() {
+    let keyframes = keyframes(0.6);
+    let deformation = trained(&recipe(&[]), &keyframes).deformation();
+    let field = deformation.field().expect("one");
+    let (time, step) = (0.4, 2e-3);
+    let places = crate::geometry::testing::random_places(150, 0.5, 3);
+    let gradients = field.gradients(&places, time);
+    let mut far = 0;
+    for (x, gradient) in places.iter().zip(&gradients) {
+        let mut off = 0.0_f32;
+        for axis in 0..3 {
+            let at = |by: f32| {
+                let mut x = *x;
+                x[axis] += by;
+                field.values(&[x], time)[0]
+            };
+            off = off.max(((at(step) - at(-step)) / (2.0 * step) - gradient[axis]).abs());
+        }
+        far += usize::from(off > 0.02);
+    }
+    // Where the closest point of a shape changes there is no gradient: a few places lie near such.
+    assert!(far < 12, "{far} of 150");
+}
+
+#[test]
+fn a_checkpoint_gives_the_same_field_and_goes_on_to_the_same_bits() {
+    let keyframes = keyframes(0.6);
+    let (recipe, data) = (recipe(&[]), keyframes.training_data());
+    let whole = trained(&recipe, &keyframes);
+    let mut first = Solved::new(&recipe, &keyframes).expect("shapes");
+    for step in 0..4 {
+        first.advance(&data, step, false);
+    }
+    let records = first.records().expect("it can be stored");
+    let mut second = Solved::new(&recipe, &keyframes).expect("shapes");
+    second.restore(&records).expect("its own record");
+    for step in 4..6 {
+        second.advance(&data, step, false);
+    }
+    assert_eq!(
+        second.records().expect("stored").0,
+        whole.records().expect("stored").0
+    );
+    // A run that is only looked at has no shapes but those of its checkpoint.
+    let mut seen = Solved::unset(&recipe);
+    seen.restore(&whole.records().expect("stored"))
+        .expect("whole");
+    let points = &keyframes.keys[0].cloud.points[..50];
+    let values = |solved: &Solved| {
+        solved
+            .deformation()
+            .field()
+            .expect("one")
+            .values(points, 0.3)
+    };
+    assert_eq!(values(&seen), values(&whole));
+}
+
+#[test]
+fn damaged_records_are_refused_by_name() {
+    let keyframes = keyframes(0.2);
+    let recipe = recipe(&[]);
+    let solved = Solved::new(&recipe, &keyframes).expect("shapes");
+    let records = solved.records().expect("stored");
+    for k in 0..2 {
+        let mut cut = records.clone();
+        let half = cut.0[k].1.len() / 2;
+        cut.0[k].1.truncate(half);
+        let error = Solved::unset(&recipe).restore(&cut).expect_err("cut");
+        assert_eq!(error.file, records.0[k].0);
+        let mut lost = records.clone();
+        lost.0.remove(k);
+        let error = Solved::unset(&recipe).restore(&lost).expect_err("lost");
+        assert_eq!(
+            (error.file, error.problem.as_str()),
+            (records.0[k].0.clone(), "it is missing")
+        );
+    }
+}
+
+#[test]
+fn each_term_is_reported_with_its_weight() {
+    let keyframes = keyframes(0.6);
+    let recipe = recipe(&["loss.strain=5", "training.seed=3"]);
+    let mut solved = Solved::new(&recipe, &keyframes).expect("shapes");
+    let terms = solved
+        .advance(&keyframes.training_data(), 0, true)
+        .expect("read");
+    let names: Vec<&str> = terms.iter().map(|term| term.name).collect();
+    assert_eq!(
+        names,
+        ["matching", "on-surface", "strain", "divergence", "screw"]
+    );
+    // Before the first step nothing moves: pairs are as far apart as they were given.
+    let apart = keyframes.between[0].iter().map(|(a, b)| {
+        (0..3)
+            .map(|i| f64::from(a[i] - b[i]).powi(2))
+            .sum::<f64>()
+            .sqrt()
+    });
+    let mean = apart.sum::<f64>() / keyframes.between[0].len() as f64;
+    assert!(
+        (terms[0].raw - mean).abs() < 0.05 * mean,
+        "{} {mean}",
+        terms[0].raw
+    );
+    assert_eq!(terms[0].weighted, 200.0 * terms[0].raw);
+    let terms = solved
+        .advance(&keyframes.training_data(), 1, true)
+        .expect("read");
+    assert!(terms[2].raw > 0.0 && terms[2].weighted == 5.0 * terms[2].raw);
+}
+
+#[test]
+fn shapes_without_a_distance_are_refused_with_a_cure() {
+    let mut keyframes = keyframes(0.2);
+    keyframes.keys[1].mesh = None;
+    keyframes.keys[1].cloud.normals = None;
+    let Err(text) = Solved::new(&recipe(&[]), &keyframes) else {
+        panic!("it has no distance");
+    };
+    assert!(
+        text.contains("the target") && text.contains("data.normals"),
+        "{text}"
+    );
+}
+
+#[test]
+fn every_key_that_it_names_acts() {
+    let keyframes = keyframes(0.6);
+    let outcome = |changes: &[&str]| {
+        let recipe = recipe(changes);
+        let mut solved = Solved::new(&recipe, &keyframes).expect("shapes");
+        for step in 0..4 {
+            solved.advance(&keyframes.training_data(), step, false);
+        }
+        solved.records().expect("stored").0
+    };
+    let plain = outcome(&[]);
+    for change in [
+        "loss.matching=100",
+        "loss.on-surface=50",
+        "loss.strain=6",
+        "loss.divergence=4",
+        "loss.screw=10",
+        "training.steps=8",
+        "training.correspondence-batch=300",
+        "training.time-steps=3",
+        "training.band-widths=[0.03]",
+        "training.seed=1",
+        "spline.spacing=0.1",
+        "spline.coarse-share=0",
+        "spline.band=4000",
+        "spline.surface-samples=100",
+        "spline.robust=0.03",
+        "spline.iterations=5",
+        "spline.tolerance=0.3",
+    ] {
+        assert!(outcome(&[change]) != plain, "{change}: nothing changed");
+    }
+}
