@@ -36,4 +36,4 @@ pub use linear::Scalar;
 pub use mesh::Mesh;
 pub(crate) use mesh::vertex_normals;
 pub(crate) use neighbours::{Neighbour, NeighbourSearch};
-pub(crate) use triangles::TriangleSearch;
+pub(crate) use triangles::{Closest, TriangleSearch};

@@ -10,13 +10,13 @@
 //! nothing. The winding number does: the sum of the solid angles of all triangles over `4 pi`, with far groups
 //! of triangles seen as one dipole (Barill et al., "Fast winding numbers for soups and clouds", 2018).
 
+use std::f64::consts::PI;
+
 use rustc_hash::FxHashMap;
 
 use super::edges::weld;
 use super::linear::{Scalar, add, cross, difference, dot, length, scaled};
 use super::mesh::Mesh;
-
-use std::f64::consts::PI;
 
 /// Triangles in a leaf.
 const LEAF: usize = 4;

@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 
 use super::distance::SignedDistance;
 use super::keyframes::Keyframe;
-use crate::geometry::linear::{cross, difference, unit};
-use crate::geometry::{Mesh, TriangleSearch};
+use crate::geometry::linear::{cross, difference, scaled, unit};
+use crate::geometry::{Closest, Mesh, TriangleSearch};
 
 /// Queries that a core takes at a time: near ones together, since the last answer starts the next search.
 const AT_A_TIME: usize = 512;
@@ -110,12 +110,7 @@ impl Solid {
                 let at = |&x: &[f32; 3]| {
                     let closest = search.closest(x, near);
                     near = closest.triangle;
-                    let inside = if *overlaps {
-                        search.winding(x) > 0.5
-                    } else {
-                        search.is_behind(&closest, x)
-                    };
-                    signed(closest.squared.sqrt(), inside)
+                    sign(search, *overlaps, &closest, x) * closest.squared.sqrt()
                 };
                 chunk.iter().map(at).collect()
             }
@@ -129,15 +124,11 @@ impl Solid {
         let at = |&x: &[f32; 3]| match &self.kind {
             Kind::Mesh { search, overlaps } => {
                 let closest = search.closest(x, 0);
-                let away = unit(difference(x, closest.point));
                 if closest.squared < ON_SURFACE * ON_SURFACE {
                     unit(search.normal(&closest))
-                } else if *overlaps && search.winding(x) > 0.5
-                    || !*overlaps && search.is_behind(&closest, x)
-                {
-                    away.map(|part| -part)
                 } else {
-                    away
+                    let away = unit(difference(x, closest.point));
+                    scaled(away, sign(search, *overlaps, &closest, x))
                 }
             }
             Kind::Cloud(distance) => distance.slope(x),
@@ -146,8 +137,14 @@ impl Solid {
     }
 }
 
-fn signed(distance: f32, inside: bool) -> f32 {
-    if inside { -distance } else { distance }
+/// -1 inside, 1 outside. Where parts lie inside others the winding number decides.
+fn sign(search: &TriangleSearch, overlaps: bool, closest: &Closest, x: [f32; 3]) -> f32 {
+    let inside = if overlaps {
+        search.winding(x) > 0.5
+    } else {
+        search.is_behind(closest, x)
+    };
+    if inside { -1.0 } else { 1.0 }
 }
 
 /// Whether some of the surface lies inside another part of it: places just outside of it are not outside.

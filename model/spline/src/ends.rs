@@ -13,7 +13,7 @@ use crate::basis::{SUPPORT, TIMES};
 use crate::cell::{Lanes, Node, add_value, first_three, value};
 use crate::field::SplineField;
 use crate::real::{Fuse, Kernel, Real, run};
-use crate::scatter::{Part, parts, run_length};
+use crate::scatter::{Part, by_first, each_run, parts, run_length};
 use crate::trajectory::{Flow, Influence, Matrix, STAGES, merged, merged_places};
 
 /// Trajectories that a thread takes at a time.
@@ -139,13 +139,8 @@ impl<R: Real> EndTerms<R> {
         weights: Vec<Matrix<R>>,
     ) -> Self {
         let (grid, basis) = (field.grid(), field.time_basis());
-        let mut order: Vec<(u32, u32)> = ends
-            .influences
-            .iter()
-            .enumerate()
-            .map(|(at, influence)| (grid.locate(influence.point).first, at as u32))
-            .collect();
-        order.sort_unstable();
+        let influences = ends.influences.iter();
+        let order = by_first(influences.map(|influence| grid.locate(influence.point).first));
         let mut slots = vec![0; order.len()];
         let mut places = Vec::with_capacity(order.len());
         for &(first, at) in &order {
@@ -227,19 +222,15 @@ impl<R: Real> EndTerms<R> {
     }
 
     fn spread(&mut self, strides: [usize; 2]) {
-        let length = run_length(self.places.len());
         let pulls = &self.pulls;
-        self.parts
-            .par_iter_mut()
-            .zip(self.places.par_chunks(length))
-            .for_each(|(part, places)| {
-                run(Spread {
-                    pulls,
-                    strides,
-                    places,
-                    part,
-                });
+        each_run(&mut self.parts, &self.places, |part, places| {
+            run(Spread {
+                pulls,
+                strides,
+                places,
+                part,
             });
+        });
     }
 }
 
@@ -278,9 +269,7 @@ struct Spread<'a, R> {
 impl<R: Real> Kernel for Spread<'_, R> {
     #[inline(always)]
     fn run<F: Fuse>(self, f: F) {
-        let start = self.part.start;
-        let nodes = self.part.nodes.as_flattened_mut();
-        nodes.fill(Node::ZERO);
+        let (start, nodes) = self.part.cleared();
         for place in self.places {
             let (m, g) = (&place.matrix, self.pulls[place.trajectory as usize]);
             let column = |j: usize| m[0][j] * g[0] + m[1][j] * g[1] + m[2][j] * g[2];

@@ -19,7 +19,7 @@ use crate::cell::{LANES, Node};
 use crate::ends::{EndPlace, EndTerms};
 use crate::prior::{PriorPlace, PriorTerms};
 use crate::real::{Fuse, Kernel, Real, run};
-use crate::scatter::{BLOCK, Part, overlap, parts, run_length};
+use crate::scatter::{BLOCK, Part, each_run, overlap, parts};
 use crate::trajectory::Matrix;
 
 /// Unknowns of a node.
@@ -50,34 +50,28 @@ impl<R: Real> Preconditioner<R> {
     ) -> Self {
         let firsts: Vec<u32> = ends.places.iter().map(|place| place.first).collect();
         let mut of_ends: Vec<Part<R, PAIRS>> = parts(&firsts, strides);
-        of_ends
-            .par_iter_mut()
-            .zip(ends.places.par_chunks(run_length(firsts.len())))
-            .for_each(|(part, places)| {
-                run(EndBlocks {
-                    places,
-                    weights: &ends.weights,
-                    strides,
-                    part,
-                });
+        each_run(&mut of_ends, &ends.places, |part, places| {
+            run(EndBlocks {
+                places,
+                weights: &ends.weights,
+                strides,
+                part,
             });
+        });
         let firsts: Vec<u32> = priors
             .places
             .iter()
             .map(|place| place.located.first)
             .collect();
         let mut of_priors: Vec<Part<R, PAIRS>> = parts(&firsts, strides);
-        of_priors
-            .par_iter_mut()
-            .zip(priors.places.par_chunks(run_length(firsts.len())))
-            .for_each(|(part, places)| {
-                run(PriorBlocks {
-                    places,
-                    rates,
-                    strides,
-                    part,
-                });
+        each_run(&mut of_priors, &priors.places, |part, places| {
+            run(PriorBlocks {
+                places,
+                rates,
+                strides,
+                part,
             });
+        });
         let mut inverses = vec![[Node::ZERO; SIZE]; nodes];
         inverses
             .par_chunks_mut(BLOCK)

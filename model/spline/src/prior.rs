@@ -7,15 +7,13 @@
 //! Strain and screw vanish for rigid motion along a screw. `|tr J|` is `sqrt((tr J)^2 + 0.05^2)`, by
 //! iteratively reweighted squares. The screw term is linearised at the present field.
 
-use rayon::prelude::*;
-
 use crate::basis::TIMES;
 use crate::cell::{Jet, Node, WideJet, add_jet, jet};
 use crate::field::SplineField;
 use crate::grid::Located;
 use crate::options::Weights;
 use crate::real::{Fuse, Kernel, Real, run};
-use crate::scatter::{Part, parts, run_length};
+use crate::scatter::{Part, by_first, each_run, parts};
 use crate::trajectory::Matrix;
 
 /// Below this the divergence counts by its square.
@@ -61,12 +59,8 @@ pub(crate) struct PriorTerms<R: Real> {
 
 impl<R: Real> PriorTerms<R> {
     pub(crate) fn new(field: &SplineField<R>, samples: &[Sample<R>], weights: &Weights) -> Self {
-        let mut order: Vec<(u32, u32)> = samples
-            .iter()
-            .enumerate()
-            .map(|(at, sample)| (field.grid().locate(sample.point).first, at as u32))
-            .collect();
-        order.sort_unstable();
+        let first = |sample: &Sample<R>| field.grid().locate(sample.point).first;
+        let order = by_first(samples.iter().map(first));
         let sorted: Vec<&Sample<R>> = order.iter().map(|&(_, at)| &samples[at as usize]).collect();
         let points: Vec<[R; 3]> = sorted.iter().map(|sample| sample.point).collect();
         let times: Vec<R> = sorted.iter().map(|sample| sample.time).collect();
@@ -98,37 +92,29 @@ impl<R: Real> PriorTerms<R> {
 
     /// The parts of the product with the Gauss-Newton matrix.
     pub(crate) fn spread_product(&mut self, nodes: &[Node<R>], strides: [usize; 2]) {
-        let length = run_length(self.places.len());
         let rates = self.rates;
-        self.parts
-            .par_iter_mut()
-            .zip(self.places.par_chunks(length))
-            .for_each(|(part, places)| {
-                run(Product {
-                    nodes,
-                    strides,
-                    rates,
-                    places,
-                    part,
-                });
+        each_run(&mut self.parts, &self.places, |part, places| {
+            run(Product {
+                nodes,
+                strides,
+                rates,
+                places,
+                part,
             });
+        });
     }
 
     /// The parts of the gradient.
     pub(crate) fn spread_gradient(&mut self, strides: [usize; 2]) {
-        let length = run_length(self.places.len());
         let rates = self.rates;
-        self.parts
-            .par_iter_mut()
-            .zip(self.places.par_chunks(length))
-            .for_each(|(part, places)| {
-                run(Gradient {
-                    strides,
-                    rates,
-                    places,
-                    part,
-                });
+        each_run(&mut self.parts, &self.places, |part, places| {
+            run(Gradient {
+                strides,
+                rates,
+                places,
+                part,
             });
+        });
     }
 }
 
@@ -220,9 +206,7 @@ struct Product<'a, R: Real> {
 impl<R: Real> Kernel for Product<'_, R> {
     #[inline(always)]
     fn run<F: Fuse>(self, f: F) {
-        let start = self.part.start;
-        let nodes = self.part.nodes.as_flattened_mut();
-        nodes.fill(Node::ZERO);
+        let (start, nodes) = self.part.cleared();
         for place in self.places {
             let (located, times) = (&place.located, [place.time, self.rates]);
             let u = jet(f, self.nodes, self.strides, located, times[0], times[1]);
@@ -251,9 +235,7 @@ struct Gradient<'a, R: Real> {
 impl<R: Real> Kernel for Gradient<'_, R> {
     #[inline(always)]
     fn run<F: Fuse>(self, f: F) {
-        let start = self.part.start;
-        let nodes = self.part.nodes.as_flattened_mut();
-        nodes.fill(Node::ZERO);
+        let (start, nodes) = self.part.cleared();
         let none = WideJet {
             value: [R::ZERO; 4],
             rate: [R::ZERO; 4],

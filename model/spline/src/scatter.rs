@@ -44,6 +44,36 @@ pub(crate) fn parts<R: Real, const N: usize>(
     firsts.chunks(run_length(firsts.len())).map(part).collect()
 }
 
+impl<R: Real> Part<R, 1> {
+    /// The first node, and the nodes, cleared.
+    #[inline(always)]
+    pub(crate) fn cleared(&mut self) -> (usize, &mut [Node<R>]) {
+        let nodes = self.nodes.as_flattened_mut();
+        nodes.fill(Node::ZERO);
+        (self.start, nodes)
+    }
+}
+
+/// The numbers of places with their first nodes, in the order of these.
+pub(crate) fn by_first(firsts: impl Iterator<Item = u32>) -> Vec<(u32, u32)> {
+    let numbered = firsts.zip(0..);
+    let mut order: Vec<(u32, u32)> = numbered.collect();
+    order.sort_unstable();
+    order
+}
+
+/// Gives each run of sorted places to `spread`, with its private copy of the nodes, on all cores.
+pub(crate) fn each_run<R: Real, T: Sync, const N: usize>(
+    parts: &mut [Part<R, N>],
+    places: &[T],
+    spread: impl Fn(&mut Part<R, N>, &[T]) + Sync,
+) {
+    parts
+        .par_iter_mut()
+        .zip(places.par_chunks(run_length(places.len())))
+        .for_each(|(part, places)| spread(part, places));
+}
+
 /// `out = base_factor base + sum of the parts`, and `base . out` in float64.
 pub(crate) fn add_up<R: Real>(
     parts: &[&[Part<R, 1>]],
