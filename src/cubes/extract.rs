@@ -12,7 +12,7 @@
 //!
 //! # What can be missed
 //! * As in every method on a grid: what lies between nodes. A sheet or thread thinner than a
-//!   cell, or a bubble smaller than one, may fall between them.
+//!   cell may fall between them, and so may a separate piece smaller than two cells.
 //! * A larger piece only if it is separate from all others, so that following the surface does not
 //!   lead to it, and no node of the first scan (32 to 63 cells along the longest side) lies in it,
 //!   and the field rises from it more than twice as steeply as between any two neighbouring nodes

@@ -102,13 +102,14 @@ impl Lattice {
 
 #[inline]
 fn block_key(node: Node) -> u64 {
-    pack(node.map(|index| index / SIDE))
+    let [x, y, z] = node;
+    pack([x / SIDE, y / SIDE, z / SIDE])
 }
 
 #[inline]
 fn place_in_block(node: Node) -> usize {
-    let [x, y, z] = node.map(|index| index % SIDE);
-    (x + SIDE * (y + SIDE * z)) as usize
+    let [x, y, z] = node;
+    (x % SIDE + SIDE * (y % SIDE + SIDE * (z % SIDE))) as usize
 }
 
 /// Three indices in one key; z counts most, so that keys sort into layers.

@@ -127,7 +127,10 @@ where
 /// The corner values of the cell above `cell` if the surface passes through it.
 fn mixed_corners<F>(search: &Search<'_, F>, cell: Node) -> Option<[f32; 8]> {
     // Cells that the surface crosses are complete; one with an unknown corner is not crossed.
-    let nodes = std::array::from_fn(|which| corner(cell, which as u32, 1));
+    let mut nodes = [cell; 8];
+    for (which, node) in nodes.iter_mut().enumerate() {
+        *node = corner(cell, which as u32, 1);
+    }
     let values = search.lattice.get_all(nodes)?;
     let inside = values.iter().filter(|&&value| value < 0.0).count();
     (1..8).contains(&inside).then_some(values)

@@ -132,18 +132,26 @@ impl TriangleSearch {
                 }
                 continue;
             }
-            let [first, second] = [index + 1, node.second].map(|child| {
-                let away = to_box(&self.nodes[child as usize], x);
-                (child, away)
-            });
-            let (nearer, farther) = if first.1 <= second.1 {
+            let children = (index + 1, node.second);
+            let away = (
+                to_box(&self.nodes[children.0 as usize], x),
+                to_box(&self.nodes[children.1 as usize], x),
+            );
+            let (first, second) = ((children.0, away.0), (children.1, away.1));
+            let (nearer, farther) = if away.0 <= away.1 {
                 (first, second)
             } else {
                 (second, first)
             };
-            stack[depth] = farther;
-            stack[depth + 1] = nearer;
-            depth += 2;
+            // What is farther than the best one is left out here already; the nearer one goes on top.
+            if farther.1 < best.squared {
+                stack[depth] = farther;
+                depth += 1;
+            }
+            if nearer.1 < best.squared {
+                stack[depth] = nearer;
+                depth += 1;
+            }
         }
         best
     }
@@ -215,12 +223,12 @@ fn solid_angle(corners: &[[f32; 3]; 3], x: [f32; 3]) -> f64 {
 /// The squared distance of a place from a box.
 #[inline]
 fn to_box(node: &Node, x: [f32; 3]) -> f32 {
-    let out = |axis: usize| {
-        let beyond = (node.low[axis] - x[axis]).max(x[axis] - node.high[axis]);
-        let beyond = beyond.max(0.0);
-        beyond * beyond
-    };
-    out(0) + out(1) + out(2)
+    let mut squared = 0.0;
+    for (x, (low, high)) in x.into_iter().zip(node.low.into_iter().zip(node.high)) {
+        let beyond = (low - x).max(x - high).max(0.0);
+        squared += beyond * beyond;
+    }
+    squared
 }
 
 /// The point of a triangle closest to `p`.

@@ -10,13 +10,14 @@
 //! 1/2 a scan from one side would be closed flat from rim to rim and a sheet have no inside, at the surface's
 //! own level they would not be closed at all; half-way a round sheet is closed by a bulge of 0.58 of its radius.
 
+use std::f64::consts::PI;
 use std::num::NonZeroUsize;
 
 use rayon::prelude::*;
 
 use crate::geometry::NeighbourSearch;
 use crate::geometry::density::{self, areas, squared_spacing};
-use crate::geometry::linear::{difference, dot, unit};
+use crate::geometry::linear::{difference, dot};
 use crate::geometry::winding::{Charges, SummationTree};
 
 /// Nearest points whose planes are averaged.
@@ -25,8 +26,18 @@ const PLANES: NonZeroUsize = NonZeroUsize::new(4).expect("4 is not 0");
 /// Distances below this many spacings are measured to the planes.
 const CLOSE: f64 = 2.0;
 
-/// Points, at most, whose winding numbers tell that on the surface.
-const LEVELS: usize = 1000;
+/// Points, at most, whose winding numbers tell that on the surface, and whose heights tell the noise.
+const LOOKED_AT: usize = 1000;
+
+/// The curvature at which a smoothed surface is as far off by the smoothing as by the noise that is left:
+/// features of this radius or more are kept. In normalised units.
+const CURVATURE: f64 = 30.0;
+
+/// The most planes that are averaged.
+const MOST_PLANES: usize = 80;
+
+/// Standard deviations of a normal distribution to the median of its absolute values.
+const TO_DEVIATION: f64 = 1.4826;
 
 /// Points with normals, arranged for distance queries.
 #[derive(Debug)]
@@ -38,7 +49,18 @@ pub(super) struct SignedDistance {
     dipoles: Charges<3>,
     /// The winding number that divides inside from outside.
     level: f64,
+    /// Mean distance of neighbouring points.
+    spacing: f64,
     close: f64,
+    planes: Planes,
+}
+
+/// How the planes of the nearest points are averaged.
+#[derive(Clone, Copy, Debug)]
+struct Planes {
+    count: NonZeroUsize,
+    /// The width of the Gaussian weights; none: by the inverse of the squared distance.
+    width: Option<f64>,
 }
 
 impl SignedDistance {
@@ -60,7 +82,7 @@ impl SignedDistance {
             .zip(areas(&neighbours))
             .map(|(normal, area)| normal.map(|n| f64::from(n) * area));
         let dipoles = tree.charges(&dipoles.collect::<Vec<_>>());
-        let some = points.par_iter().step_by(points.len().div_ceil(LEVELS));
+        let some = points.par_iter().step_by(points.len().div_ceil(LOOKED_AT));
         let mut levels: Vec<f64> = some.map(|&point| tree.winding(&dipoles, point)).collect();
         // The median: those at wrong normals are far off.
         levels.sort_by(f64::total_cmp);
@@ -71,49 +93,97 @@ impl SignedDistance {
             normals: normals.to_vec(),
             tree,
             dipoles,
+            spacing,
             close: CLOSE * spacing,
+            planes: Planes {
+                count: PLANES,
+                width: None,
+            },
         }
+    }
+
+    /// The same with a surface that is smoothed where the points are noisy: planes are averaged with Gaussian
+    /// weights of a width that grows with the noise, see [`CURVATURE`] (implicit moving least squares; Kolluri, "Provably good
+    /// moving least squares", 2005). Without noise it is [`Self::new`].
+    ///
+    /// # Panics
+    /// As [`Self::new`].
+    pub(super) fn smoothed(points: &[[f32; 3]], normals: &[[f32; 3]]) -> Self {
+        let mut out = Self::new(points, normals);
+        let spacing = out.spacing;
+        // Noise falls to sigma spacing / (sqrt(pi) width), the surface moves by curvature width^2 / 4: the sum of
+        // their squares is least at this width.
+        let balance = 8.0 * (out.noise() * spacing / CURVATURE).powi(2) / PI;
+        let width = balance.cbrt().sqrt();
+        // The points within twice the width.
+        let count = (4.0 * PI * (width / spacing).powi(2)).ceil() as usize;
+        if count > PLANES.get() {
+            out.planes = Planes {
+                count: NonZeroUsize::new(count.min(MOST_PLANES)).unwrap_or(PLANES),
+                width: Some(width),
+            };
+            out.close = CLOSE * width.max(spacing);
+        }
+        out
+    }
+
+    /// The standard deviation of the points' heights over the planes of their neighbours.
+    fn noise(&self) -> f64 {
+        let apart = self.points.len().div_ceil(LOOKED_AT);
+        let height = |&point: &[f64; 3]| {
+            let around = self.search.nearest(point, density::NEIGHBOURS);
+            let others = around.iter().skip(1).map(|neighbour| {
+                let k = neighbour.index as usize;
+                dot(
+                    difference(point, self.points[k]),
+                    self.normals[k].map(f64::from),
+                )
+            });
+            others.sum::<f64>().abs() / (around.len() - 1).max(1) as f64
+        };
+        let mut heights: Vec<f64> = self.points.par_iter().step_by(apart).map(height).collect();
+        heights.sort_by(f64::total_cmp);
+        TO_DEVIATION * heights[heights.len() / 2]
+    }
+
+    /// The mean distance of neighbouring points.
+    pub(super) fn spacing(&self) -> f64 {
+        self.spacing
     }
 
     /// The signed distance of `x` from the surface.
     pub(super) fn at(&self, x: [f32; 3]) -> f32 {
         let x = x.map(f64::from);
-        let nearest = self.search.nearest(x, PLANES);
+        let nearest = self.search.nearest(x, self.planes.count);
+        let closest = nearest[0].squared_distance;
         let reach = self.close * self.close;
         let (mut height, mut total) = (0.0, 0.0);
         for neighbour in &nearest {
             let k = neighbour.index as usize;
             let normal = self.normals[k].map(f64::from);
-            let weight = 1.0 / (neighbour.squared_distance + 1e-3 * reach);
+            let weight = match self.planes.width {
+                // Relative to the closest one, which is never 0.
+                Some(width) => (-(neighbour.squared_distance - closest) / (width * width)).exp(),
+                None => 1.0 / (neighbour.squared_distance + 1e-3 * reach),
+            };
             height += weight * dot(difference(x, self.points[k]), normal);
             total += weight;
         }
         let plane = height / total;
-        let distance = nearest[0].squared_distance.sqrt();
+        let distance = closest.sqrt();
         // From the planes to the nearest point between one and two times `close`: no jump.
         let share = (distance / self.close - 1.0).clamp(0.0, 1.0);
-        let magnitude = plane.abs().min(distance) * (1.0 - share) + distance * share;
+        let near = match self.planes.width {
+            Some(_) => plane.abs(),
+            None => plane.abs().min(distance),
+        };
+        let magnitude = near * (1.0 - share) + distance * share;
         let side = if share > 0.0 {
             self.level - self.tree.winding(&self.dipoles, x)
         } else {
             plane
         };
         magnitude.copysign(side) as f32
-    }
-
-    /// The gradient of the signed distance at `x`: by central differences of a few spacings, since close to
-    /// the points it is pieced together from their planes.
-    pub(super) fn slope(&self, x: [f32; 3]) -> [f32; 3] {
-        let by = (self.close / 2.0) as f32;
-        let difference = |axis: usize| {
-            let moved = |by: f32| {
-                let mut x = x;
-                x[axis] += by;
-                self.at(x)
-            };
-            moved(by) - moved(-by)
-        };
-        unit([difference(0), difference(1), difference(2)])
     }
 }
 

@@ -4,7 +4,9 @@
 //! |---|---|
 //! | `sample.rs` | area-uniform points on a mesh |
 //! | `solid.rs` | the signed distance of a shape as it is |
+//! | `far.rs` | the same far from its surface, interpolated |
 //! | `distance.rs` | signed distances to points with normals |
+//! | `reconstruct.rs` | a closed mesh from points with normals |
 //! | `normals.rs` | normals of a raw cloud, pointing outwards |
 //! | `correspond.rs` | pairs of vertices that are known to correspond |
 //! | `normalise.rs` | the joint frame in which the networks work, and the way back |
@@ -17,9 +19,11 @@
 
 mod correspond;
 mod distance;
+mod far;
 mod keyframes;
 mod normalise;
 mod normals;
+mod reconstruct;
 mod sample;
 mod solid;
 

@@ -1,13 +1,14 @@
 //! The signed distance of a shape as it is, without training: what the flow carries with the preset "instant".
 //!
 //! Of a closed mesh it is exact, sharp edges included ([`TriangleSearch`]). Of a cloud, or of a mesh that is not
-//! closed, it is that of its points with normals ([`SignedDistance`]).
+//! closed, it is that of the closed mesh that [`reconstruct`] makes of its points with normals.
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::distance::SignedDistance;
+use super::far::FarField;
 use super::keyframes::Keyframe;
+use super::reconstruct::reconstruct;
 use crate::geometry::linear::{cross, difference, scaled, unit};
 use crate::geometry::{Closest, Mesh, TriangleSearch};
 
@@ -26,29 +27,23 @@ const OUTSIDE: f32 = 1e-3;
 /// What a signed distance is made from: all that a checkpoint has to hold of a shape. Normalised.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct SolidParts {
-    /// The vertices of a closed mesh, or points.
+    /// The vertices of a closed mesh.
     pub points: Vec<[f32; 3]>,
-    /// The triangles of a closed mesh; none of a cloud.
+    /// Its triangles.
     pub triangles: Vec<[u32; 3]>,
-    /// Unit normals of a cloud's points; none of a mesh.
-    pub normals: Vec<[f32; 3]>,
 }
 
 impl SolidParts {
-    /// Of a key frame; `None` if it is neither a closed mesh nor has normals.
+    /// Of a key frame; `None` if it is neither a closed mesh nor has normals, or its points close to nothing.
     pub(crate) fn of(key: &Keyframe) -> Option<Self> {
-        if let Some(mesh) = &key.mesh {
-            return Some(Self {
-                points: mesh.vertices.clone(),
-                triangles: mesh.triangles.clone(),
-                normals: Vec::new(),
-            });
+        let of = |mesh: Mesh<f32>| Self {
+            points: mesh.vertices,
+            triangles: mesh.triangles,
+        };
+        match &key.mesh {
+            Some(mesh) => Some(of(mesh.clone())),
+            None => reconstruct(&key.cloud.points, key.cloud.normals.as_ref()?).map(of),
         }
-        Some(Self {
-            points: key.cloud.points.clone(),
-            triangles: Vec::new(),
-            normals: key.cloud.normals.clone()?,
-        })
     }
 
     /// Whether the numbers fit together: what a damaged file need not.
@@ -56,27 +51,22 @@ impl SolidParts {
         let count = self.points.len();
         let finite = |rows: &[[f32; 3]]| rows.as_flattened().iter().all(|part| part.is_finite());
         let named = self.triangles.as_flattened().iter();
-        count > 0
-            && finite(&self.points)
-            && finite(&self.normals)
-            && named.clone().all(|&index| (index as usize) < count)
-            && (!self.triangles.is_empty() || self.normals.len() == count)
+        count > 0 && finite(&self.points) && named.clone().all(|&index| (index as usize) < count)
     }
 }
 
 /// A shape with its signed distance.
 pub(crate) struct Solid {
     parts: SolidParts,
-    kind: Kind,
+    exact: Exact,
+    far: FarField,
 }
 
-enum Kind {
-    Mesh {
-        search: TriangleSearch,
-        /// Whether parts of it lie inside others.
-        overlaps: bool,
-    },
-    Cloud(Box<SignedDistance>),
+/// What an exact distance takes.
+struct Exact {
+    search: TriangleSearch,
+    /// Whether parts of it lie inside others.
+    overlaps: bool,
 }
 
 impl Solid {
@@ -85,15 +75,12 @@ impl Solid {
         if !parts.is_whole() {
             return None;
         }
-        let kind = if parts.triangles.is_empty() {
-            Kind::Cloud(Box::new(SignedDistance::new(&parts.points, &parts.normals)))
-        } else {
-            let mesh = Mesh::new(parts.points.clone(), parts.triangles.clone());
-            let search = TriangleSearch::new(&mesh)?;
-            let overlaps = overlaps(&search);
-            Kind::Mesh { search, overlaps }
-        };
-        Some(Self { parts, kind })
+        let mesh = Mesh::new(parts.points.clone(), parts.triangles.clone());
+        let search = TriangleSearch::new(&mesh)?;
+        let overlaps = overlaps(&search);
+        let exact = Exact { search, overlaps };
+        let far = FarField::new(&parts.points, |places| exact.distances(places));
+        Some(Self { parts, exact, far })
     }
 
     /// What it is made from.
@@ -103,48 +90,70 @@ impl Solid {
 
     /// The signed distance at each of the places, negative inside.
     pub(crate) fn distances(&self, places: &[[f32; 3]]) -> Vec<f32> {
-        let chunks = places.par_chunks(AT_A_TIME);
-        let found = chunks.map(|chunk| match &self.kind {
-            Kind::Mesh { search, overlaps } => {
-                let mut near = 0;
-                let at = |&x: &[f32; 3]| {
-                    let closest = search.closest(x, near);
-                    near = closest.triangle;
-                    sign(search, *overlaps, &closest, x) * closest.squared.sqrt()
-                };
-                chunk.iter().map(at).collect()
-            }
-            Kind::Cloud(distance) => chunk.iter().map(|&x| distance.at(x)).collect::<Vec<f32>>(),
-        });
-        found.collect::<Vec<_>>().concat()
+        self.exact.distances(places)
+    }
+
+    /// The same for a search of the surface: far from it within a few per cent only, and much faster.
+    pub(crate) fn distances_to_search(&self, places: &[[f32; 3]]) -> Vec<f32> {
+        let mut found: Vec<f32> = places
+            .par_iter()
+            .with_min_len(AT_A_TIME)
+            .map(|&x| self.far.at(x).unwrap_or(f32::NAN))
+            .collect();
+        let unknown = |(_, value): &(usize, &f32)| value.is_nan();
+        let near: Vec<usize> = found
+            .iter()
+            .enumerate()
+            .filter(unknown)
+            .map(|(k, _)| k)
+            .collect();
+        let at: Vec<[f32; 3]> = near.iter().map(|&k| places[k]).collect();
+        for (k, value) in near.into_iter().zip(self.distances(&at)) {
+            found[k] = value;
+        }
+        found
     }
 
     /// The unit gradient of the signed distance at each of the places.
     pub(crate) fn gradients(&self, places: &[[f32; 3]]) -> Vec<[f32; 3]> {
-        let at = |&x: &[f32; 3]| match &self.kind {
-            Kind::Mesh { search, overlaps } => {
-                let closest = search.closest(x, 0);
-                if closest.squared < ON_SURFACE * ON_SURFACE {
-                    unit(search.normal(&closest))
-                } else {
-                    let away = unit(difference(x, closest.point));
-                    scaled(away, sign(search, *overlaps, &closest, x))
-                }
+        let Exact { search, .. } = &self.exact;
+        let at = |&x: &[f32; 3]| {
+            let closest = search.closest(x, 0);
+            if closest.squared < ON_SURFACE * ON_SURFACE {
+                unit(search.normal(&closest))
+            } else {
+                let away = unit(difference(x, closest.point));
+                scaled(away, self.exact.sign(&closest, x))
             }
-            Kind::Cloud(distance) => distance.slope(x),
         };
         places.par_iter().with_min_len(AT_A_TIME).map(at).collect()
     }
 }
 
-/// -1 inside, 1 outside. Where parts lie inside others the winding number decides.
-fn sign(search: &TriangleSearch, overlaps: bool, closest: &Closest, x: [f32; 3]) -> f32 {
-    let inside = if overlaps {
-        search.winding(x) > 0.5
-    } else {
-        search.is_behind(closest, x)
-    };
-    if inside { -1.0 } else { 1.0 }
+impl Exact {
+    fn distances(&self, places: &[[f32; 3]]) -> Vec<f32> {
+        let chunks = places.par_chunks(AT_A_TIME);
+        let found = chunks.map(|chunk| {
+            let mut near = 0;
+            let at = |&x: &[f32; 3]| {
+                let closest = self.search.closest(x, near);
+                near = closest.triangle;
+                self.sign(&closest, x) * closest.squared.sqrt()
+            };
+            chunk.iter().map(at).collect::<Vec<f32>>()
+        });
+        found.collect::<Vec<_>>().concat()
+    }
+
+    /// -1 inside, 1 outside. Where parts lie inside others the winding number decides.
+    fn sign(&self, closest: &Closest, x: [f32; 3]) -> f32 {
+        let inside = if self.overlaps {
+            self.search.winding(x) > 0.5
+        } else {
+            self.search.is_behind(closest, x)
+        };
+        if inside { -1.0 } else { 1.0 }
+    }
 }
 
 /// Whether some of the surface lies inside another part of it: places just outside of it are not outside.
@@ -173,7 +182,6 @@ mod tests {
                 .map(|x| x.map(|part| part as f32))
                 .collect(),
             triangles: mesh.triangles.clone(),
-            normals: Vec::new(),
         }
     }
 
@@ -197,13 +205,8 @@ mod tests {
     fn a_part_inside_another_makes_no_surface_of_its_own() {
         let mut mesh = bumpy_sphere(24);
         let other = mesh.moved(|x| [x[0] + 0.3, x[1], x[2]]);
-        assert!(matches!(
-            Solid::new(parts(&mesh)).expect("a solid").kind,
-            Kind::Mesh {
-                overlaps: false,
-                ..
-            }
-        ));
+        let alone = Solid::new(parts(&mesh)).expect("a solid");
+        assert!(!alone.exact.overlaps);
         let first = mesh.vertices.len() as u32;
         mesh.vertices.extend(other.vertices);
         let named = other.triangles.iter().map(|t| t.map(|index| index + first));

@@ -33,7 +33,8 @@ pub(super) struct CarriedShapes {
 
 impl CarriedShapes {
     pub(super) fn new(field: SplineField, shapes: Arc<[Solid; 2]>) -> Self {
-        let steps = needed(&field, &shapes);
+        let probes = [0, 1].map(|end: usize| some_of(&shapes[end].parts().points, PROBES));
+        let steps = field.steps_within([&probes[0], &probes[1]], TOLERANCE, [2, MOST_STEPS]);
         Self {
             field,
             shapes,
@@ -46,33 +47,32 @@ impl CarriedShapes {
         (((to - from).abs() * self.steps as f64).ceil() as usize).max(1)
     }
 
+    /// The blend of both distances where points come from and go to.
+    fn blend(
+        &self,
+        ends: &[[f32; 6]],
+        time: f64,
+        distances: impl Fn(&Solid, &[[f32; 3]]) -> Vec<f32>,
+    ) -> Vec<f32> {
+        let t = time as f32;
+        let of = |end: usize| {
+            // What has no weight is not computed.
+            if (end == 0 && t >= 1.0) || (end == 1 && t <= 0.0) {
+                return vec![0.0; ends.len()];
+            }
+            let place = |both: &[f32; 6]| [both[3 * end], both[3 * end + 1], both[3 * end + 2]];
+            let places: Vec<[f32; 3]> = ends.iter().map(place).collect();
+            distances(&self.shapes[end], &places)
+        };
+        let (g, h) = (of(0), of(1));
+        let blend = |(g, h): (&f32, &f32)| (1.0 - t) * g + t * h;
+        g.iter().zip(&h).map(blend).collect()
+    }
+
     fn carry_to(&self, points: &[[f32; 3]], from: f64, to: f64) -> Vec<[f32; 3]> {
         let steps = self.share(from, to);
         self.field.carry(points, from as f32, to as f32, steps)
     }
-}
-
-/// The least number of steps at which all but a twentieth of the probes end within the tolerance of where twice
-/// the steps take them.
-fn needed(field: &SplineField, shapes: &[Solid; 2]) -> usize {
-    let mut steps = 2;
-    for (shape, [from, to]) in shapes.iter().zip([[0.0, 1.0], [1.0, 0.0]]) {
-        let probes = some_of(&shape.parts().points, PROBES);
-        let mut ends = field.carry(&probes, from, to, steps);
-        while steps < MOST_STEPS {
-            let finer = field.carry(&probes, from, to, 2 * steps);
-            let far = ends.iter().zip(&finer).filter(|(a, b)| {
-                let squared = (0..3).map(|i| (a[i] - b[i]) * (a[i] - b[i])).sum::<f32>();
-                f64::from(squared) > TOLERANCE * TOLERANCE
-            });
-            if far.count() * 20 <= probes.len() {
-                break;
-            }
-            steps *= 2;
-            ends = finer;
-        }
-    }
-    steps
 }
 
 impl Deformation for CarriedShapes {
@@ -87,7 +87,7 @@ impl Deformation for CarriedShapes {
 
 impl SurfaceField for CarriedShapes {
     fn values(&self, points: &[[f32; 3]], time: f64) -> Vec<f32> {
-        self.values_from(&self.ends(points, time), time)
+        self.blend(&self.ends(points, time), time, Solid::distances)
     }
 
     /// The gradient of each distance where the point comes from, carried back by the transpose of the motion's
@@ -127,22 +127,9 @@ impl CarriedField for CarriedShapes {
         start.iter().zip(&end).map(both).collect()
     }
 
+    /// Exact near the surface; [`SurfaceField::values`] are so everywhere.
     fn values_from(&self, ends: &[[f32; 6]], time: f64) -> Vec<f32> {
-        let t = time as f32;
-        let of = |end: usize| {
-            // What has no weight is not computed.
-            if (end == 0 && t >= 1.0) || (end == 1 && t <= 0.0) {
-                return vec![0.0; ends.len()];
-            }
-            let place = |both: &[f32; 6]| [0, 1, 2].map(|axis| both[3 * end + axis]);
-            let places: Vec<[f32; 3]> = ends.iter().map(place).collect();
-            self.shapes[end].distances(&places)
-        };
-        let (g, h) = (of(0), of(1));
-        g.iter()
-            .zip(&h)
-            .map(|(g, h)| (1.0 - t) * g + t * h)
-            .collect()
+        self.blend(ends, time, Solid::distances_to_search)
     }
 }
 

@@ -189,7 +189,7 @@ impl Trainer for Solved {
 fn solid(key: &Keyframe, name: &str) -> Result<Solid, String> {
     let parts = SolidParts::of(key).ok_or_else(|| {
         format!(
-            "velocity.kind = \"spline\": the {name} has no normals and is no closed mesh; set data.normals \
+            "velocity.kind = \"spline\": the {name} is no closed mesh, and has no normals that close it; set data.normals \
              to \"auto\", or choose the preset \"quick\""
         )
     })?;
@@ -235,12 +235,10 @@ fn weights(recipe: &Recipe) -> Weights {
 
 fn options(recipe: &Recipe) -> Options {
     let (keys, training) = (spline::keys(recipe), &recipe.training);
-    let coarse = (training.steps as f64 * keys.coarse_share).round() as usize;
-    let mut steps = vec![coarse, training.steps - coarse];
-    steps.retain(|steps| *steps > 0);
+    let steps = steps_of_levels(training.steps, &keys.coarse_shares);
     Options {
         // Of the first level; each further one halves it.
-        spacing: keys.spacing * if coarse > 0 { 2.0 } else { 1.0 },
+        spacing: keys.spacing * 2.0_f64.powi(steps.len() as i32 - 1),
         steps,
         time: TimeBasis::Linear,
         trajectory_steps: training.time_steps,
@@ -253,4 +251,21 @@ fn options(recipe: &Recipe) -> Options {
         seed: training.seed,
         ..Options::default()
     }
+}
+
+/// Steps of each level of the grid, the coarsest first; levels without any are left out.
+fn steps_of_levels(steps: usize, coarse_shares: &[f64]) -> Vec<usize> {
+    let mut left = steps;
+    let mut levels: Vec<usize> = coarse_shares
+        .iter()
+        .map(|share| {
+            // The last level has a step at least.
+            let taken = (left as f64 * share).round().min(left as f64 - 1.0) as usize;
+            left -= taken;
+            taken
+        })
+        .collect();
+    levels.push(left);
+    levels.retain(|steps| *steps > 0);
+    levels
 }

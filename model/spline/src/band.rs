@@ -58,7 +58,7 @@ pub(crate) fn samples<R: Real>(
     field: &SplineField<R>,
     clouds: &[Vec<[R; 3]>; 2],
     options: &Options,
-    amount: usize,
+    [amount, trajectory_steps]: [usize; 2],
     step: usize,
 ) -> Vec<Sample<R>> {
     let half = amount.div_ceil(2);
@@ -83,7 +83,7 @@ pub(crate) fn samples<R: Real>(
         }
     }
     // Half as exact as the ends of trajectories: where a sample lies exactly matters little.
-    let steps = options.trajectory_steps.div_ceil(2);
+    let steps = trajectory_steps.div_ceil(2);
     let mut points = field.carry_each(&starts, &from, &to, steps);
     points
         .par_chunks_mut(PIECE)

@@ -210,6 +210,39 @@ impl<R: Real> SplineField<R> {
         out
     }
 
+    /// How many steps from time 0 to 1 follow the field closely: `least`, doubled until all but a twentieth of
+    /// the probes end within `tolerance` of where twice the steps take them, at most `most`. The first probes
+    /// start at time 0, the others at time 1.
+    pub fn steps_within(
+        &self,
+        probes: [&[[R; 3]]; 2],
+        tolerance: f64,
+        [least, most]: [usize; 2],
+    ) -> usize {
+        let mut steps = least;
+        for (probes, [from, to]) in probes
+            .into_iter()
+            .zip([[R::ZERO, R::ONE], [R::ONE, R::ZERO]])
+        {
+            let mut ends = self.carry(probes, from, to, steps);
+            while 2 * steps <= most {
+                let finer = self.carry(probes, from, to, 2 * steps);
+                let far = |(a, b): &(&[R; 3], &[R; 3])| {
+                    let square = |i: usize| (a[i] - b[i]).wide().powi(2);
+                    // What is not finite is far.
+                    let near = square(0) + square(1) + square(2) <= tolerance * tolerance;
+                    !near
+                };
+                if ends.iter().zip(&finer).filter(far).count() * 20 <= probes.len() {
+                    break;
+                }
+                steps *= 2;
+                ends = finer;
+            }
+        }
+        steps
+    }
+
     /// The same field on a grid of half the spacing.
     ///
     /// # Errors

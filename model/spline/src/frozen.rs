@@ -14,6 +14,8 @@ pub(crate) struct Frozen<R: Real> {
     /// For each on-surface sample, the nearest place, its normal, and the agreement.
     planes: Vec<([f64; 3], [f64; 3], f64)>,
     samples: Vec<Sample<R>>,
+    /// Of each trajectory.
+    steps: usize,
     ridge: f64,
     pub gradient: Vec<Node<R>>,
 }
@@ -36,12 +38,19 @@ impl<R: Real> Solver<R> {
         let (problem, surfaces, clouds) = self.given();
         let (options, weights) = (self.options(), self.weights());
         let targets = Targets::new(problem, options, weights, step);
-        let steps = options.trajectory_steps;
+        let steps = self.trajectory_steps(field);
         let ends = Ends::new(field, &targets.starts, &targets.times, steps, false);
         let (mut system, _) = self.linearise(field, level, step, false)?;
         Ok(Frozen {
             planes: targets.planes(&ends, surfaces),
-            samples: band::samples(field, clouds, options, options.band.div_ceil(2), step),
+            samples: band::samples(
+                field,
+                clouds,
+                options,
+                [options.band.div_ceil(2), steps],
+                step,
+            ),
+            steps,
             targets,
             ridge: system.ridge().wide(),
             gradient: system.gradient(field),
@@ -53,10 +62,9 @@ impl<R: Real> Frozen<R> {
     /// The objective, written out from its formula.
     pub(crate) fn objective(&self, solver: &Solver<R>, field: &SplineField<R>) -> f64 {
         let (options, weights) = (solver.options(), solver.weights());
-        let steps = options.trajectory_steps;
         let from: Vec<R> = self.targets.times.iter().map(|times| times[0]).collect();
         let to: Vec<R> = self.targets.times.iter().map(|times| times[1]).collect();
-        let ends = field.carry_each(&self.targets.starts, &from, &to, steps);
+        let ends = field.carry_each(&self.targets.starts, &from, &to, self.steps);
         let goals = self.targets.goals();
         let (of_pairs, of_samples) = ends.split_at(goals.len());
         let robust = |r: f64| r.hypot(options.robust_scale);

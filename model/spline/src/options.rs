@@ -25,7 +25,7 @@ impl Default for Weights {
             on_surface: 100.0,
             strain: 3.0,
             divergence: 2.0,
-            screw: 30.0,
+            screw: 15.0,
         }
     }
 }
@@ -41,7 +41,8 @@ pub struct Options {
     pub time: TimeBasis,
     /// Cells around the box of both shapes.
     pub margin: usize,
-    /// Steps of a trajectory from one shape to the other.
+    /// Least steps of a trajectory from one shape to the other; doubled where the field bends paths so much
+    /// that their ends would be off by more than a thousandth.
     pub trajectory_steps: usize,
     /// Points of the band at the last level; half as many before.
     pub band: usize,
@@ -72,11 +73,11 @@ pub struct Options {
 impl Default for Options {
     fn default() -> Self {
         Self {
-            spacing: 0.14,
-            steps: vec![8, 10],
+            spacing: 0.2,
+            steps: vec![8, 4, 6],
             time: TimeBasis::Linear,
             margin: 2,
-            trajectory_steps: 2,
+            trajectory_steps: 3,
             band: 24_000,
             band_spread: vec![0.01, 0.05],
             voxel: 0.75,

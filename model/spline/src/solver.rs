@@ -21,6 +21,15 @@ use crate::real::Real;
 use crate::system::System;
 use crate::targets::{Surface, Targets};
 
+/// Points of each shape that decide how many steps a trajectory takes.
+const PROBES: usize = 500;
+
+/// How exactly the ends of trajectories are followed, in the unit of the shapes.
+const EXACT: f64 = 1e-3;
+
+/// The most steps of a trajectory that are chosen.
+const MOST_STEPS: usize = 24;
+
 /// The terms of the objective at the present field, without their weights.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Terms {
@@ -213,6 +222,21 @@ impl<R: Real> Solver<R> {
         })
     }
 
+    /// Steps of the trajectories through a field.
+    pub(crate) fn trajectory_steps(&self, field: &SplineField<R>) -> usize {
+        let probes = [0, 1].map(|end| {
+            let cloud: &Vec<[R; 3]> = &self.clouds[end];
+            let apart = cloud.len().div_ceil(PROBES);
+            cloud.iter().step_by(apart).copied().collect::<Vec<_>>()
+        });
+        let least = self.options.trajectory_steps;
+        field.steps_within(
+            [&probes[0], &probes[1]],
+            EXACT,
+            [least, MOST_STEPS.max(least)],
+        )
+    }
+
     /// What was given, for tests that write out the objective.
     #[cfg(test)]
     pub(crate) fn given(&self) -> (&Problem, &[Surface; 2], &[Vec<[R; 3]>; 2]) {
@@ -230,7 +254,7 @@ impl<R: Real> Solver<R> {
         let not_finite = |what| SplineError::NotFinite { step, what };
         let (options, weights) = (&self.options, &self.weights);
         let targets = Targets::new(&self.problem, options, weights, step);
-        let steps = options.trajectory_steps;
+        let steps = self.trajectory_steps(field);
         let ends = Ends::new(field, &targets.starts, &targets.times, steps, merge);
         let finite = |x: &R| x.wide().is_finite();
         if !ends.points.iter().flatten().all(finite) {
@@ -250,7 +274,7 @@ impl<R: Real> Solver<R> {
         } else {
             options.band.div_ceil(2)
         };
-        let samples = band::samples(field, &self.clouds, options, amount, step);
+        let samples = band::samples(field, &self.clouds, options, [amount, steps], step);
         let finite = |x: &R| x.wide().is_finite();
         if !samples.iter().flat_map(|sample| &sample.point).all(finite) {
             return Err(not_finite("a point of the band"));

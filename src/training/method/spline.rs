@@ -43,7 +43,7 @@ pub(super) static SPLINE: MethodSpec = MethodSpec {
             "the levels of the grid are a share of the steps",
         ),
         ("spline.spacing", "a field keeps its grid"),
-        ("spline.coarse-share", "a field keeps its grid"),
+        ("spline.coarse-shares", "a field keeps its grid"),
     ],
     // Presets of networks have far more steps.
     changes: &["training.steps=18"],
@@ -54,11 +54,12 @@ section! {
     spline: SplineKeys {
         /// Edge of a cell of the grid. Finer cells follow finer motion; time grows with the number of
         /// cells that the shape passes through.
-        spacing: f64 = 0.07 | 0.07 | 0.07 | 0.07 | 0.07,
+        spacing: f64 = 0.05 | 0.05 | 0.05 | 0.05 | 0.05,
             Rule::number(0.01, 1.0).unit("normalised units");
-        /// Share of the steps that use cells of twice the edge, before the others.
-        coarse_share: f64 = 0.45 | 0.45 | 0.45 | 0.45 | 0.45,
-            Rule::number(0.0, 1.0).zero("starts with the fine cells");
+        /// Levels of coarser cells that come first, each of half the edge of the one before. A number is
+        /// the share of the steps still left that its level takes.
+        coarse_shares: Vec<f64> = [0.45, 0.4] | [0.45, 0.4] | [0.45, 0.4] | [0.45, 0.4] | [0.45, 0.4],
+            Rule::list(0.0, 0.9);
         /// Samples of the space around the moving surface in each step, where the regularisers act.
         band: usize = 24_000 | 24_000 | 24_000 | 24_000 | 24_000, Rule::whole(100, 10_000_000);
         /// Points of each surface in each step that must arrive on the other one.

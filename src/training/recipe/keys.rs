@@ -209,7 +209,7 @@ section! {
         /// Weight of |dV/dt + D V|^2 near the surface, D the strain rate. Each part may keep a
         /// constant screw motion at no cost. The recommended regulariser for a time-dependent V.
         /// Not in the paper.
-        screw: f64 = 30 | 30 | 30 | 30 | 0, Rule::positive_or_zero().zero("turns it off");
+        screw: f64 = 15 | 30 | 30 | 30 | 0, Rule::positive_or_zero().zero("turns it off");
     }
 }
 
@@ -252,8 +252,9 @@ section! {
         /// turn of one radian, "midpoint" with 3 steps is off by 0.0185 of the distance from the
         /// axis, "rk4" with 2 by 0.0005.
         integrator: Integrator = "rk4" | "rk4" | "rk4" | "rk4" | "euler", Rule::word(INTEGRATORS);
-        /// Steps of the integrator from time 0 to 1. The paper leaves them open.
-        time_steps: usize = 2 | 2 | 2 | 2 | 10, Rule::whole(1, 1000);
+        /// Steps of the integrator from time 0 to 1; splines take twice as many, or more, where paths bend
+        /// sharply. The paper leaves them open.
+        time_steps: usize = 3 | 2 | 2 | 2 | 10, Rule::whole(1, 1000);
         /// Times of the samples in between: "random", or the "grid" of the integrator's steps. The
         /// paper leaves it open.
         times: TimeSampling = "random" | "random" | "random" | "random" | "random",

@@ -12,7 +12,7 @@ data.keys                      [0,1]   [-1,1]   [9,10000000] [9,10000001]
 data.points                    64      63       10000000 10000001
 data.correspondence-fraction   1e-9    0        1        1.001
 spline.spacing                 0.01     0.009    1        1.001
-spline.coarse-share            0        -1e-9    1        1.001
+spline.coarse-shares           [0]      [-1e-9]  [0.9]    [0.901]
 spline.band                    100      99       10000000 10000001
 spline.surface-samples         1        0        1000000  1000001
 spline.robust                  1e-9     0        1        1.001
