@@ -85,11 +85,11 @@ mod tests {
 
     #[test]
     fn noise_is_averaged_out() {
-        // A standard deviation of 0.0035, more than a spacing.
+        // A standard deviation of 0.0035, as large as half a spacing. A third of it is left.
         let (points, normals) = cloud(0.006, |_| true);
         let mesh = reconstruct(&points, &normals).expect("a surface");
         assert_eq!(mesh.components().len(), 1);
-        assert!(off(&mesh) < 0.001, "{}", off(&mesh));
+        assert!(off(&mesh) < 0.0035 / 3.0, "{}", off(&mesh));
     }
 
     #[test]
