@@ -50,6 +50,7 @@ fn spheres() -> Keyframes {
     Keyframes {
         keys: keys.collect(),
         between: data.between,
+        confidence: vec![Vec::new()],
         normalisation: Normalisation {
             centre: [0.0; 3],
             scale: 1.0,
