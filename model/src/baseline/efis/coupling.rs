@@ -187,7 +187,7 @@ impl<B: ModelBackend> Coupling<B> {
             if self.stays[i] {
                 x.rows[i].clone()
             } else {
-                self.moved_row(i, &x.rows, &factor, &slopes)
+                moved_row(i, &x.rows, &factor, &slopes)
             }
         });
         CarriedJet {
@@ -195,28 +195,6 @@ impl<B: ModelBackend> Coupling<B> {
             rows,
             log_det,
         }
-    }
-
-    /// The derivatives of coordinate `i` after the coupling, from those of all coordinates before it.
-    fn moved_row(
-        &self,
-        i: usize,
-        rows: &[Tensor<B, 2>; 3],
-        factor: &Tensor<B, 2>,
-        slopes: &[(usize, Tensor<B, 2>)],
-    ) -> Tensor<B, 2> {
-        let [n, width] = rows[0].dims();
-        let column = |tensor: &Tensor<B, 2>| tensor.clone().slice([0..n, i..i + 1]);
-        let mut row = rows[i].clone() * column(factor);
-        for (k, slope) in slopes {
-            row = row
-                + if *k == TIME {
-                    column(slope) * one_hot(1, width, TIME, &factor.device())
-                } else {
-                    rows[*k].clone() * column(slope)
-                };
-        }
-        row
     }
 
     /// `s` and `u`, each followed by its derivatives by the columns `reads`; zero for coordinates that stay,
@@ -240,6 +218,27 @@ impl<B: ModelBackend> Coupling<B> {
                 .collect()
         })
     }
+}
+
+/// The derivatives of coordinate `i` after the coupling, from those of all coordinates before it.
+fn moved_row<B: Backend>(
+    i: usize,
+    rows: &[Tensor<B, 2>; 3],
+    factor: &Tensor<B, 2>,
+    slopes: &[(usize, Tensor<B, 2>)],
+) -> Tensor<B, 2> {
+    let [n, width] = rows[0].dims();
+    let column = |tensor: &Tensor<B, 2>| tensor.clone().slice([0..n, i..i + 1]);
+    let mut row = rows[i].clone() * column(factor);
+    for (k, slope) in slopes {
+        row = row
+            + if *k == TIME {
+                column(slope) * one_hot(1, width, TIME, &factor.device())
+            } else {
+                rows[*k].clone() * column(slope)
+            };
+    }
+    row
 }
 
 /// The output of a network and its tangents, of an input with its tangents stacked below it.
