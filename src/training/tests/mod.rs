@@ -2,6 +2,7 @@
 
 mod acting;
 mod methods;
+mod optimiser;
 mod samples;
 
 use std::path::Path;

@@ -76,6 +76,8 @@ training.batch                 64      63       1000000  1000001
 training.correspondence-batch  1       0        1000000  1000001
 training.learning-rate         1e-9    0        1        1.001
 training.velocity-learning-rate 1e-9   0        1        1.001
+training.muon-rate             1e-9    0        1        1.001
+training.velocity-muon-rate    1e-9    0        1        1.001
 training.decay                 1e-9    0        1        1.001
 training.decay-every           1e-9    0        1        1.001
 training.final-learning-rate   0       -1e-9    1        1.001
