@@ -2,7 +2,7 @@
 //! explicit velocity field `V`, their derivatives, and the objective that trains them together.
 //!
 //! The method is that of "Implicit Neural Surface Deformation with Explicit Velocity Fields"
-//! (ICLR 2025), called *the paper* below. This crate uses burn. It reads no file and no clock, and writes
+//! (ICLR 2025), called *the paper* below. This crate uses burn, and the package `isomorph-spline`. It reads no file and no clock, and writes
 //! to no terminal.
 //!
 //! | paper | here | shape |
@@ -11,7 +11,7 @@
 //! | `t` | times, in `[0, 1]` | `[n, 1]` |
 //! | `f(x, t)` | [`ImplicitNet::forward`] | `[n, 1]` |
 //! | `grad f`, `f_t` | [`operators::ImplicitJet`] | `[n, 3]`, `[n, 1]` |
-//! | `V(x)`, `V(x, t)` | [`VelocityNet::forward`] | `[n, 3]` |
+//! | `V(x)`, `V(x, t)` | [`VelocityNet::forward`], or a spline, [`SplineVelocity::forward`] | `[n, 3]` |
 //! | `J = dV/dx`, `div V`, Laplacian of `V` | [`operators::VelocityJet`] | `[n, 3, 3]`, `[n, 1]`, `[n, 3]` |
 //! | `phi(x, t)` | [`trajectory::integrate`] | `[n, 3]` |
 //! | `f(x, t)` of two end fields carried by `V` | [`FlowGeometry`] | `[n, 1]` |
@@ -49,7 +49,10 @@ pub mod operators;
 
 pub use autodiff::{ModelBackend, TrainBackend, product, without_denormals};
 pub use flow::{Carried, FlowGeometry, Geometry, Motion, trajectory};
-pub use nets::{ImplicitNet, ImplicitNetConfig, Mlp, MlpConfig, VelocityNet, VelocityNetConfig};
+pub use nets::{
+    ImplicitNet, ImplicitNetConfig, Mlp, MlpConfig, SplineGrid, SplineVelocity, VelocityNet,
+    VelocityNetConfig,
+};
 pub use objective::{Objective, Term};
 
 #[cfg(test)]

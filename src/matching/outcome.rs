@@ -90,13 +90,18 @@ pub struct Rigid {
 }
 
 impl Matching {
-    /// The pairs without their confidences.
+    /// The pairs with their confidences.
     pub fn correspondences(&self) -> Correspondences {
         Correspondences {
             pairs: self
                 .pairs
                 .iter()
                 .map(|pair| [pair.source, pair.target])
+                .collect(),
+            confidence: self
+                .pairs
+                .iter()
+                .map(|pair| as_stored(pair.confidence))
                 .collect(),
         }
     }
@@ -110,15 +115,22 @@ impl Matching {
         crate::atomic::write_atomically(path, |out| {
             writeln!(out, "source_index,target_index,confidence")?;
             for pair in &self.pairs {
-                writeln!(
-                    out,
-                    "{},{},{:.4}",
-                    pair.source, pair.target, pair.confidence
-                )?;
+                let confidence = written(pair.confidence);
+                writeln!(out, "{},{},{confidence}", pair.source, pair.target)?;
             }
             Ok(())
         })
     }
+}
+
+/// A confidence as it stands in a file.
+fn written(confidence: f64) -> String {
+    format!("{confidence:.4}")
+}
+
+/// A confidence as it is read from a file: a run that finds pairs has the bits of one that reads them.
+fn as_stored(confidence: f64) -> f32 {
+    written(confidence).parse().expect("a number was written")
 }
 
 impl Rigid {

@@ -50,6 +50,7 @@ fn spheres() -> Keyframes {
     Keyframes {
         keys: keys.collect(),
         between: data.between,
+        confidence: vec![Vec::new()],
         normalisation: Normalisation {
             centre: [0.0; 3],
             scale: 1.0,
@@ -97,10 +98,17 @@ fn train(learner: &mut Learner, folder: &Path, stop_after: Option<usize>) -> Vec
 
 #[test]
 fn an_interrupted_run_resumes_to_the_same_weights_and_keeps_the_newest_checkpoints() {
+    for optimiser in ["training.optimiser=adam", "training.optimiser=muon"] {
+        resumes_to_the_same_weights(&[optimiser]);
+    }
+}
+
+#[track_caller]
+fn resumes_to_the_same_weights(keys: &[&str]) {
     let whole = tempfile::tempdir().expect("a temporary folder");
     let torn = tempfile::tempdir().expect("a temporary folder");
-    train(&mut learner(&[]), whole.path(), None);
-    let mut first = learner(&[]);
+    train(&mut learner(keys), whole.path(), None);
+    let mut first = learner(keys);
     let events = train(&mut first, torn.path(), Some(7));
     assert!(
         events
@@ -109,7 +117,7 @@ fn an_interrupted_run_resumes_to_the_same_weights_and_keeps_the_newest_checkpoin
     );
     let newest = Checkpoint::newest(torn.path()).expect("written on the interrupt");
     assert_eq!(newest.state.step, 7);
-    let mut second = resumed(recipe(&[]), &spheres(), &newest).expect("resumes");
+    let mut second = resumed(recipe(keys), &spheres(), &newest).expect("resumes");
     train(&mut second, torn.path(), None);
     let steps = |folder: &Path| -> Vec<usize> {
         checkpoint::list(folder)
@@ -125,7 +133,7 @@ fn an_interrupted_run_resumes_to_the_same_weights_and_keeps_the_newest_checkpoin
         let read = |folder: &Path| std::fs::read(folder.join("step-000010").join(file));
         let (a, b) = (read(whole.path()), read(torn.path()));
         // Bit for bit: the products are too small for more than one thread.
-        assert_eq!(a.expect("written"), b.expect("written"), "{file}");
+        assert_eq!(a.expect("written"), b.expect("written"), "{file}, {keys:?}");
     }
 }
 

@@ -2,9 +2,9 @@
 //! order.
 //!
 //! The file has `source_index,target_index` on each line, vertices counted from 0 in the order of
-//! their files. A third number from 0 to 1, the confidence that `isomorph match` writes, may follow;
-//! here all pairs count alike. Spaces around the numbers, empty lines, lines that start with `#` and one line of
-//! column names before the first pair are passed over. A vertex may occur more than once.
+//! their files. A third number from 0 to 1 may follow, the confidence that `isomorph match` writes. A pair
+//! without one has the confidence 1. Spaces around the numbers, empty lines, lines that start with `#` and one
+//! line of column names before the first pair are passed over. A vertex may occur more than once.
 
 use std::path::Path;
 
@@ -13,10 +13,12 @@ use rand::Rng;
 use crate::formats::{Shape, ShapeError, file_length};
 
 /// Known pairs: indices into the vertices of the source and of the target.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Correspondences {
     /// `[source vertex, target vertex]` each.
     pub pairs: Vec<[u32; 2]>,
+    /// How sure each pair is, 0 to 1; empty where no pair says.
+    pub confidence: Vec<f32>,
 }
 
 impl Correspondences {
@@ -33,7 +35,7 @@ impl Correspondences {
         };
         let bytes = std::fs::read(path).map_err(unreadable)?;
         let text = String::from_utf8_lossy(&bytes);
-        let mut pairs = Vec::new();
+        let (mut pairs, mut confidence) = (Vec::new(), Vec::new());
         let mut names_allowed = true;
         for (at, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
             let line = line.trim();
@@ -43,7 +45,7 @@ impl Correspondences {
             if std::mem::take(&mut names_allowed) && line.starts_with(char::is_alphabetic) {
                 continue;
             }
-            let pair = parse_pair(line).ok_or_else(|| {
+            let (pair, sure) = parse_pair(line).ok_or_else(|| {
                 let shown: String = line.chars().take(60).collect();
                 let allowed = "must be source_index,target_index, two whole numbers from 0 (and a \
                                confidence from 0 to 1, if any)";
@@ -60,13 +62,25 @@ impl Correspondences {
                 }
             }
             pairs.push(pair.map(|index| index as u32));
+            confidence.push(sure);
         }
         if pairs.is_empty() {
             return Err(ShapeError::NoCorrespondences {
                 path: path.to_owned(),
             });
         }
-        Ok(Self { pairs })
+        let said = confidence.iter().any(Option::is_some);
+        Ok(Self {
+            pairs,
+            confidence: if said {
+                confidence
+                    .into_iter()
+                    .map(|sure| sure.unwrap_or(1.0))
+                    .collect()
+            } else {
+                Vec::new()
+            },
+        })
     }
 
     /// Every vertex of the source corresponds to the target's vertex of the same index.
@@ -86,6 +100,7 @@ impl Correspondences {
             pairs: (0..source.mesh.vertices.len() as u32)
                 .map(|index| [index; 2])
                 .collect(),
+            confidence: Vec::new(),
         })
     }
 
@@ -96,21 +111,25 @@ impl Correspondences {
             return self;
         }
         let chosen = rand::seq::index::sample(rng, self.pairs.len(), count);
+        let chosen: Vec<usize> = chosen.into_iter().collect();
+        let sure = |&index: &usize| self.confidence.get(index).copied();
         Self {
-            pairs: chosen.into_iter().map(|index| self.pairs[index]).collect(),
+            pairs: chosen.iter().map(|&index| self.pairs[index]).collect(),
+            confidence: chosen.iter().filter_map(sure).collect(),
         }
     }
 }
 
 /// Two whole numbers separated by a comma, and perhaps a share of 1 after another.
-fn parse_pair(line: &str) -> Option<[u64; 2]> {
+fn parse_pair(line: &str) -> Option<([u64; 2], Option<f32>)> {
     let mut fields = line.split(',').map(str::trim);
     let pair = [fields.next()?.parse().ok()?, fields.next()?.parse().ok()?];
-    if let Some(confidence) = fields.next() {
-        let confidence: f64 = confidence.parse().ok()?;
-        (0.0..=1.0).contains(&confidence).then_some(())?;
+    let mut confidence = None;
+    if let Some(given) = fields.next() {
+        let given: f32 = given.parse().ok()?;
+        confidence = Some((0.0..=1.0).contains(&given).then_some(given)?);
     }
-    fields.next().is_none().then_some(pair)
+    fields.next().is_none().then_some((pair, confidence))
 }
 
 #[cfg(test)]
@@ -159,10 +178,10 @@ mod tests {
     #[test]
     fn a_confidence_may_follow_and_is_checked() {
         let text = "source_index,target_index,confidence\n0,199,0.75\n1,2,1\n3,4\n5,6,0\n";
-        assert_eq!(
-            read(text).expect("read").pairs,
-            [[0, 199], [1, 2], [3, 4], [5, 6]]
-        );
+        let found = read(text).expect("read");
+        assert_eq!(found.pairs, [[0, 199], [1, 2], [3, 4], [5, 6]]);
+        assert_eq!(found.confidence, [0.75, 1.0, 1.0, 0.0]);
+        assert!(read("0,199\n1,2\n").expect("read").confidence.is_empty());
     }
 
     #[test]
@@ -217,11 +236,16 @@ mod tests {
     fn drawing_takes_different_pairs_the_same_for_the_same_seed() {
         let all = Correspondences {
             pairs: (0..1000).map(|i| [i, 2 * i]).collect(),
+            confidence: (0..1000).map(|i| i as f32 / 1000.0).collect(),
         };
         let draw = |count, seed| {
-            all.clone()
-                .drawn(count, &mut ChaCha8Rng::seed_from_u64(seed))
-                .pairs
+            let drawn = all
+                .clone()
+                .drawn(count, &mut ChaCha8Rng::seed_from_u64(seed));
+            let own = |(pair, sure): (&[u32; 2], &f32)| *sure == pair[0] as f32 / 1000.0;
+            assert_eq!(drawn.pairs.len(), drawn.confidence.len());
+            assert!(drawn.pairs.iter().zip(&drawn.confidence).all(own));
+            drawn.pairs
         };
         let drawn = draw(50, 5);
         assert_eq!(HashSet::<_>::from_iter(&drawn).len(), 50);

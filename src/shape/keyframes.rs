@@ -22,7 +22,7 @@ use crate::geometry::winding::is_inside_out;
 use crate::geometry::{Bounds, EdgeSharing, Mesh, NeighbourSearch};
 
 /// Where correspondences come from.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) enum CorrespondenceSource {
     /// A two-column file of vertex indices.
     File(PathBuf),
@@ -92,6 +92,8 @@ pub struct Keyframes {
     pub keys: Vec<Keyframe>,
     /// Points with the points that they move to, normalised: entry `k` from key frame `k` to the next.
     pub between: Vec<Vec<PointPair>>,
+    /// How sure each of these pairs is, 0 to 1; entry `k` is empty where the pairs of that interval do not say.
+    pub confidence: Vec<Vec<f32>>,
     /// The way between the user's coordinates and these.
     pub normalisation: Normalisation,
     /// The box around all of them, normalised.
@@ -204,11 +206,13 @@ pub(crate) fn prepare(shapes: &[Shape], options: &DataOptions) -> Result<Keyfram
     }
     let normalisation = Normalisation::joint(&shapes.iter().collect::<Vec<_>>())?;
     let mut between = Vec::with_capacity(options.between.len());
+    let mut confidence = Vec::with_capacity(options.between.len());
     for (k, source) in options.between.iter().enumerate() {
         let rng = Draw::Correspondences(k).generator(options.seed);
-        let pairs = correspondences(options, source, [&shapes[k], &shapes[k + 1]], rng)?;
+        let known = correspondences(options, source, [&shapes[k], &shapes[k + 1]], rng)?;
         let place = |(from, to)| (normalisation.apply(from), normalisation.apply(to));
-        between.push(pairs.into_iter().map(place).collect());
+        between.push(known.places.into_iter().map(place).collect());
+        confidence.push(known.confidence);
     }
     let mut notes = Vec::new();
     let mut keys = Vec::with_capacity(shapes.len());
@@ -231,6 +235,7 @@ pub(crate) fn prepare(shapes: &[Shape], options: &DataOptions) -> Result<Keyfram
         bounds: bounds.expect("at least two key frames"),
         keys,
         between,
+        confidence,
         normalisation,
         notes,
     })
@@ -353,8 +358,14 @@ fn outward(
     Some(normals)
 }
 
-/// Corresponding points in the user's coordinates.
-type PointPairs = Vec<([f64; 3], [f64; 3])>;
+/// Corresponding points.
+#[derive(Default)]
+struct PointPairs {
+    /// In the user's coordinates.
+    places: Vec<([f64; 3], [f64; 3])>,
+    /// How sure each is; empty where they do not say.
+    confidence: Vec<f32>,
+}
 
 /// The correspondences of two shapes that the options ask for.
 fn correspondences(
@@ -364,7 +375,7 @@ fn correspondences(
     mut rng: ChaCha8Rng,
 ) -> Result<PointPairs, ShapeError> {
     let available = match from {
-        CorrespondenceSource::None => return Ok(Vec::new()),
+        CorrespondenceSource::None => return Ok(PointPairs::default()),
         CorrespondenceSource::File(path) => Correspondences::read_csv(path, source, target)?,
         CorrespondenceSource::SameVertices => Correspondences::same_vertices(source, target)?,
         CorrespondenceSource::Pairs(known) => known.clone(),
@@ -390,14 +401,17 @@ fn correspondences(
     if shared && source.is_mesh() && source.mesh.triangles == target.mesh.triangles {
         return Ok(surface_pairs(source, target, count, &mut rng));
     }
-    let chosen = available.drawn(count, &mut rng).pairs.into_iter();
+    let chosen = available.drawn(count, &mut rng);
     let place = |[from, to]: [u32; 2]| {
         (
             source.mesh.vertices[from as usize],
             target.mesh.vertices[to as usize],
         )
     };
-    Ok(chosen.map(place).collect())
+    Ok(PointPairs {
+        places: chosen.pairs.into_iter().map(place).collect(),
+        confidence: chosen.confidence,
+    })
 }
 
 /// Points at equal barycentric coordinates of two meshes that share their triangles, drawn by area
@@ -409,7 +423,10 @@ fn surface_pairs(source: &Shape, target: &Shape, count: usize, rng: &mut ChaCha8
         let triangle = target.mesh.triangles[face as usize];
         point_at(&target.mesh, triangle, weights.map(f64::from))
     });
-    samples.points.iter().copied().zip(moved).collect()
+    PointPairs {
+        places: samples.points.iter().copied().zip(moved).collect(),
+        confidence: Vec::new(),
+    }
 }
 
 #[cfg(test)]

@@ -212,12 +212,13 @@ fn problem(recipe: &Recipe, keyframes: &Keyframes) -> Problem {
         .div_ceil(recipe.training.correspondence_batch)
         .max(1);
     let (source, target) = known.iter().step_by(apart).copied().unzip();
+    let confidence = &keyframes.confidence[0];
     Problem {
         shapes: [cloud(0), cloud(1)],
         pairs: Pairs {
             source,
             target,
-            confidence: Vec::new(),
+            confidence: confidence.iter().step_by(apart).copied().collect(),
         },
     }
 }

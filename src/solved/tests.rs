@@ -28,6 +28,7 @@ fn keyframes(angle: f32) -> Keyframes {
     let bounds = Bounds::of(&first.vertices).union(&Bounds::of(&last.vertices));
     Keyframes {
         between: vec![pairs.collect()],
+        confidence: vec![Vec::new()],
         keys: vec![key(0.0, &first), key(1.0, &last)],
         normalisation: Normalisation {
             centre: [0.0; 3],
@@ -201,6 +202,36 @@ fn each_term_is_reported_with_its_weight() {
         .advance(&keyframes.training_data(), 1, true)
         .expect("read");
     assert!(terms[2].raw > 0.0 && terms[2].weighted == 5.0 * terms[2].raw);
+}
+
+#[test]
+fn a_pair_of_low_confidence_pulls_less() {
+    // Each point has two pairs: where it belongs, and a place 0.1 above that.
+    let height = |low: [f32; 2]| {
+        let mut keyframes = keyframes(0.3);
+        let right = keyframes.between[0].clone();
+        let above = right.iter().map(|&(a, [x, y, z])| (a, [x, y, z + 0.1]));
+        keyframes.between[0].extend(above);
+        let count = right.len();
+        keyframes.confidence[0] = [vec![low[0]; count], vec![low[1]; count]].concat();
+        // The surfaces decide nothing, so that the pairs do.
+        let recipe = recipe(&["loss.on-surface=0"]);
+        let deformation = trained(&recipe, &keyframes).deformation();
+        let motion = deformation.motion().expect("one");
+        let starts: Vec<[f32; 3]> = right.iter().map(|pair| pair.0).collect();
+        let ends = motion.carry(&starts, 0.0, 1.0);
+        let risen = ends
+            .iter()
+            .zip(&right)
+            .map(|(end, (_, goal))| end[2] - goal[2]);
+        risen.sum::<f32>() / count as f32
+    };
+    let (sure, unsure) = (height([1.0, 0.2]), height([0.2, 1.0]));
+    // Distances are not squared: the surer of two pairs wins, and the regularisers take a little.
+    assert!(
+        sure.abs() < 0.02 && (unsure - 0.1).abs() < 0.02,
+        "{sure} {unsure}"
+    );
 }
 
 #[test]

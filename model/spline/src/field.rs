@@ -44,6 +44,20 @@ impl<R: Real> SplineField<R> {
         Self { grid, basis, nodes }
     }
 
+    /// The field that is zero, on cells of one edge over a box with `margin` cells around it.
+    ///
+    /// # Errors
+    /// If the box is none, or the grid has too many nodes.
+    pub fn at_rest(
+        [lower, upper]: [[f64; 3]; 2],
+        spacing: f64,
+        margin: usize,
+        basis: TimeBasis,
+    ) -> Result<Self, SplineError> {
+        let grid = Grid::around(lower, upper, spacing, margin)?;
+        Ok(Self::zero(grid, basis))
+    }
+
     /// The field of these coefficients, as [`Self::coefficients`] gives them.
     ///
     /// # Errors

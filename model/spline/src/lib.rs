@@ -12,7 +12,7 @@
 //! | `targets`, `ends` | terms on where trajectories end |
 //! | `band`, `prior` | terms on the field itself, and the points at which they are taken |
 //! | `scatter`, `system`, `preconditioner`, `conjugate` | the linear system of a step |
-//! | `solver` | the steps |
+//! | `solver`, `samples` | the steps, and what each takes its terms at |
 //! | `real` | f32 or f64, and vector instructions chosen at run time |
 
 #![expect(
@@ -37,6 +37,7 @@ mod preconditioner;
 mod prior;
 mod problem;
 mod real;
+mod samples;
 mod scatter;
 mod solver;
 #[cfg(test)]
@@ -53,4 +54,5 @@ pub use grid::Grid;
 pub use options::{Options, Weights};
 pub use problem::{Cloud, Pairs, Problem};
 pub use real::Real;
+pub use samples::{Arrival, BandPlace, Samples};
 pub use solver::{Solver, StepReport, Terms};

@@ -160,6 +160,15 @@ impl Options {
         )
     }
 
+    /// Points of the band at a level.
+    pub(crate) fn band_at(&self, level: usize) -> usize {
+        if level + 1 == self.steps.len() {
+            self.band
+        } else {
+            self.band.div_ceil(2)
+        }
+    }
+
     /// The level of a step.
     pub(crate) fn level(&self, step: usize) -> usize {
         let mut end = 0;

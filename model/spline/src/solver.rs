@@ -171,25 +171,7 @@ impl<R: Real> Solver<R> {
     /// If there is no such step, the field is not on the grid of the step before, or a result is not
     /// finite; the field is then as before.
     pub fn advance(&mut self, step: usize) -> Result<StepReport, SplineError> {
-        if step >= self.steps() {
-            return Err(SplineError::Step {
-                step,
-                steps: self.steps(),
-            });
-        }
-        let level = self.options.level(step);
-        let grid = self.grid_of(level)?;
-        let mut field = self.field.clone();
-        while field.grid().cells[0] < grid.cells[0] {
-            field = field.refined()?;
-        }
-        if *field.grid() != grid {
-            return Err(SplineError::Field {
-                step,
-                found: format!("{:?}", field.grid()),
-                wanted: format!("{grid:?} or one coarser"),
-            });
-        }
+        let (mut field, level) = self.field_at(step)?;
         let (mut system, terms) = self.linearise(&field, level, step, true)?;
         let gradient = system.gradient(&field);
         let options = &self.options;
@@ -214,7 +196,7 @@ impl<R: Real> Solver<R> {
         Ok(StepReport {
             step,
             level,
-            spacing: grid.spacing.wide(),
+            spacing: self.field.grid().spacing.wide(),
             terms,
             iterations,
             size,
@@ -237,8 +219,34 @@ impl<R: Real> Solver<R> {
         )
     }
 
-    /// What was given, for tests that write out the objective.
-    #[cfg(test)]
+    /// The field before a step, on the grid of the step, and its level.
+    ///
+    /// # Errors
+    /// If there is no such step, or the field is not on the grid of the step before.
+    pub(crate) fn field_at(&self, step: usize) -> Result<(SplineField<R>, usize), SplineError> {
+        if step >= self.steps() {
+            return Err(SplineError::Step {
+                step,
+                steps: self.steps(),
+            });
+        }
+        let level = self.options.level(step);
+        let grid = self.grid_of(level)?;
+        let mut field = self.field.clone();
+        while field.grid().cells[0] < grid.cells[0] {
+            field = field.refined()?;
+        }
+        if *field.grid() != grid {
+            return Err(SplineError::Field {
+                step,
+                found: format!("{:?}", field.grid()),
+                wanted: format!("{grid:?} or one coarser"),
+            });
+        }
+        Ok((field, level))
+    }
+
+    /// What was given.
     pub(crate) fn given(&self) -> (&Problem, &[Surface; 2], &[Vec<[R; 3]>; 2]) {
         (&self.problem, &self.surfaces, &self.clouds)
     }
@@ -268,13 +276,8 @@ impl<R: Real> Solver<R> {
         };
         let end_terms = EndTerms::new(field, &ends, residuals.residuals, residuals.weights);
 
-        let last = level + 1 == options.steps.len();
-        let amount = if last {
-            options.band
-        } else {
-            options.band.div_ceil(2)
-        };
-        let samples = band::samples(field, &self.clouds, options, [amount, steps], step);
+        let amount = [options.band_at(level), steps];
+        let samples = band::samples(field, &self.clouds, options, amount, step);
         let finite = |x: &R| x.wide().is_finite();
         if !samples.iter().flat_map(|sample| &sample.point).all(finite) {
             return Err(not_finite("a point of the band"));

@@ -20,6 +20,7 @@ use crate::ends::Ends;
 use crate::options::{Options, Weights};
 use crate::problem::{Cloud, Problem};
 use crate::real::Real;
+use crate::samples::Arrival;
 use crate::trajectory::{Matrix, diagonal};
 
 /// How many points a leaf of the tree aims at.
@@ -123,6 +124,33 @@ impl<R: Real> Targets<R> {
         &self.goals
     }
 
+    /// The trajectories of pairs, and those of surface samples with what they should reach.
+    pub(crate) fn arrivals(
+        &self,
+        ends: &Ends<R>,
+        surfaces: &[Surface; 2],
+    ) -> (Vec<Arrival<R>>, Vec<Arrival<R>>) {
+        let count = self.goals.len();
+        let arrival = |at: usize, place, normal, factor| Arrival {
+            start: self.starts[at],
+            times: self.times[at],
+            place,
+            normal,
+            factor,
+        };
+        let goals = self.goals.iter().zip(&self.confidence).enumerate();
+        let pairs = goals.map(|(at, (&goal, &sure))| arrival(at, goal, None, sure));
+        let samples = self.samples.iter().enumerate();
+        let surface = samples.map(|(k, &(from, index))| {
+            let at = count + k;
+            let end = ends.points[at].map(R::wide);
+            let found = Found::new(end, &ends.gradients[at], surfaces, from, index);
+            let place = difference(end, found.residual);
+            arrival(at, place, found.normal, found.agreement)
+        });
+        (pairs.collect(), surface.collect())
+    }
+
     /// The nearest place of each on-surface sample, its normal, and the agreement.
     #[cfg(test)]
     pub(crate) fn planes(
@@ -130,17 +158,9 @@ impl<R: Real> Targets<R> {
         ends: &Ends<R>,
         surfaces: &[Surface; 2],
     ) -> Vec<([f64; 3], [f64; 3], f64)> {
-        let count = self.goals.len();
-        let of_samples = ends.points[count..].iter().zip(&ends.gradients[count..]);
-        of_samples
-            .zip(&self.samples)
-            .map(|((&end, gradient), &(from, at))| {
-                let end = end.map(R::wide);
-                let found = Found::new(end, gradient, surfaces, from, at);
-                let place = difference(end, found.residual);
-                (place, found.normal.expect("normals"), found.agreement)
-            })
-            .collect()
+        let (_, surface) = self.arrivals(ends, surfaces);
+        let plane = |at: Arrival<R>| (at.place, at.normal.expect("normals"), at.factor);
+        surface.into_iter().map(plane).collect()
     }
 
     fn push(&mut self, start: [f32; 3], end: usize) {

@@ -6,7 +6,7 @@
 //!
 //! Checkpoints hold the two networks under the names of the fields of [`EndFields`].
 
-use burn::module::Module;
+use burn::module::{Module, ParamId};
 use burn::tensor::Tensor;
 use burn::tensor::backend::Backend;
 
@@ -64,6 +64,12 @@ impl<B: ModelBackend> EndFields<B> {
     /// `h`, the field of the target.
     pub fn target(&self) -> &ImplicitNet<B> {
         &self.target
+    }
+
+    /// The weight matrices between two hidden layers, of both networks.
+    pub fn hidden_weights(&self) -> Vec<ParamId> {
+        let nets = [&self.source, &self.target].into_iter();
+        nets.flat_map(ImplicitNet::hidden_weights).collect()
     }
 
     /// `g` and `h` with their derivatives at `[n, 3]`; their rates mean nothing.

@@ -23,8 +23,7 @@ use super::morph::{Carried, Geometry};
 use super::trajectory::{Integrator, Steps, integrate, steps_within};
 use super::transport::transport_gradient;
 use crate::autodiff::ModelBackend;
-use crate::nets::VelocityNet;
-use crate::operators::{Derivatives, reverse};
+use crate::operators::{Derivatives, VelocityField, reverse};
 
 /// How exactly points are followed, in normalised units: a fifth of a cell at 256 cells to a side.
 const TOLERANCE: f64 = 1e-3;
@@ -39,22 +38,26 @@ const NEAR: f64 = 0.05;
 #[derive(Debug)]
 pub struct FlowGeometry<B: Backend> {
     ends: EndFields<B>,
-    velocity: VelocityNet<B>,
+    velocity: Box<dyn VelocityField<B>>,
     /// Of the Runge-Kutta integrator over all of time.
     steps: usize,
 }
 
 impl<B: ModelBackend> FlowGeometry<B> {
-    /// Of trained networks. The number of steps of the integrator is the least power of two, up to 32,
+    /// Of what was trained. The number of steps of the integrator is the least power of two, up to 32,
     /// at which all but a twentieth of the probes near either surface end within 0.001 of where twice the
     /// steps take them.
     ///
     /// `probes`: points throughout the space of both shapes, `[n, 3]`.
-    pub fn new(ends: EndFields<B>, velocity: VelocityNet<B>, probes: Tensor<B, 2>) -> Self {
+    pub fn new(
+        ends: EndFields<B>,
+        velocity: impl VelocityField<B> + 'static,
+        probes: Tensor<B, 2>,
+    ) -> Self {
         let steps = needed(&ends, &velocity, probes);
         Self {
             ends,
-            velocity,
+            velocity: Box::new(velocity),
             steps,
         }
     }
@@ -121,7 +124,7 @@ impl<B: ModelBackend> Geometry<B> for FlowGeometry<B> {
             let there = self.carry(x.clone(), t.clone(), end, steps);
             let jet = reverse::implicit_jet(net, there.clone(), t.zeros_like());
             let (way, to, method) = (Derivatives::Forward, t.clone(), Integrator::Rk4);
-            let (v, gradient) = (&self.velocity, jet.gradient);
+            let (v, gradient) = (&*self.velocity, jet.gradient);
             transport_gradient(&way, v, there, gradient, from, to, steps, method).1
         };
         let [back, ahead] = self.shares(&t);
@@ -159,7 +162,7 @@ impl<B: ModelBackend> Carried<B> for FlowGeometry<B> {
 /// Steps over the whole span of time that follow the probes near each surface within the tolerance.
 fn needed<B: ModelBackend>(
     ends: &EndFields<B>,
-    velocity: &VelocityNet<B>,
+    velocity: &dyn VelocityField<B>,
     probes: Tensor<B, 2>,
 ) -> usize {
     let count = probes.dims()[0];
@@ -196,7 +199,7 @@ mod tests {
     use super::super::morph::Motion;
     use super::*;
     use crate::autodiff::Activation;
-    use crate::nets::{ImplicitNetConfig, VelocityNetConfig};
+    use crate::nets::{ImplicitNetConfig, VelocityNet, VelocityNetConfig};
     use crate::testing::{Plain, assert_close, column, host, numbers, points, shaken};
 
     const X: [[f64; 3]; 3] = [[0.3, -0.2, 0.1], [-0.35, 0.15, 0.2], [0.05, 0.4, -0.3]];
@@ -246,12 +249,13 @@ mod tests {
     #[test]
     fn each_carried_field_is_constant_along_the_motion() {
         let flow = geometry();
-        let (t, now) = (0.4, flow.velocity.carry(points(&X), 0.0, 0.4));
+        let (_, velocity) = networks(0.3);
+        let (t, now) = (0.4, velocity.carry(points(&X), 0.0, 0.4));
         let zeros = || column(&[0.0; 3]);
         let [g, h] = flow.carried_values(now.clone(), column(&[t; 3]));
         let moved = (now.clone() - points(&X)).abs().max();
         assert!(host(moved)[0] > 0.05, "the test moves its points");
-        let end = flow.velocity.carry(points(&X), 0.0, 1.0);
+        let end = velocity.carry(points(&X), 0.0, 1.0);
         let wanted_g = flow.ends.source().forward(points(&X), zeros());
         let wanted_h = flow.ends.target().forward(end, zeros());
         // The tolerance of the integrator times a slope of about one.

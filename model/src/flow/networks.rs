@@ -1,10 +1,10 @@
-//! The two networks of the paper as what is trained: `f(x, t)` gives a surface, `V(x, t)` moves points.
+//! What is trained as what it can do: `f(x, t)` gives a surface, `V(x, t)` moves points, a network or a spline.
 
 use burn::tensor::Tensor;
 
 use super::morph::{Geometry, Motion, follow};
 use crate::autodiff::ModelBackend;
-use crate::nets::{ImplicitNet, VelocityNet};
+use crate::nets::{ImplicitNet, SplineVelocity, VelocityNet};
 use crate::operators::reverse;
 
 impl<B: ModelBackend> Geometry<B> for ImplicitNet<B> {
@@ -19,6 +19,17 @@ impl<B: ModelBackend> Geometry<B> for ImplicitNet<B> {
 }
 
 impl<B: ModelBackend> Motion<B> for VelocityNet<B> {
+    fn carry(&self, x: Tensor<B, 2>, from: f64, to: f64) -> Tensor<B, 2> {
+        follow(|x, t| self.forward(x, t), x, from, to)
+    }
+
+    fn velocity(&self, x: Tensor<B, 2>, time: f64) -> Option<Tensor<B, 2>> {
+        let t = Tensor::full([x.dims()[0], 1], time, &x.device());
+        Some(self.forward(x, t))
+    }
+}
+
+impl<B: ModelBackend> Motion<B> for SplineVelocity<B> {
     fn carry(&self, x: Tensor<B, 2>, from: f64, to: f64) -> Tensor<B, 2> {
         follow(|x, t| self.forward(x, t), x, from, to)
     }

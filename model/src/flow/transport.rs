@@ -4,8 +4,7 @@ use burn::tensor::Tensor;
 
 use super::trajectory::{Integrator, Steps, integrate};
 use crate::autodiff::ModelBackend;
-use crate::nets::VelocityNet;
-use crate::operators::{Operators, length};
+use crate::operators::{Operators, VelocityField, length};
 
 /// Carries positions and surface normals along `V` together:
 /// `dx/dt = V(x, t)`, `dn/dt = -J^T n`, the normals renormalised at the end.
@@ -18,7 +17,7 @@ use crate::operators::{Operators, length};
 )]
 pub fn transport<B: ModelBackend>(
     operators: &impl Operators,
-    net: &VelocityNet<B>,
+    net: &dyn VelocityField<B>,
     x: Tensor<B, 2>,
     n: Tensor<B, 2>,
     from: Tensor<B, 2>,
@@ -37,7 +36,7 @@ pub fn transport<B: ModelBackend>(
 #[expect(clippy::too_many_arguments, reason = "as for `transport`")]
 pub fn transport_gradient<B: ModelBackend>(
     operators: &impl Operators,
-    net: &VelocityNet<B>,
+    net: &dyn VelocityField<B>,
     x: Tensor<B, 2>,
     gradient: Tensor<B, 2>,
     from: Tensor<B, 2>,
@@ -63,7 +62,7 @@ pub fn transport_gradient<B: ModelBackend>(
 mod tests {
     use super::*;
     use crate::autodiff::Activation;
-    use crate::nets::{ImplicitNet, VelocityNetConfig};
+    use crate::nets::{ImplicitNet, VelocityNet, VelocityNetConfig};
     use crate::operators::{ImplicitJet, VelocityJet, VelocityRequest};
     use crate::testing::{Plain, assert_close, column, host, points};
 
@@ -95,7 +94,7 @@ mod tests {
 
         fn velocity_jet<B: ModelBackend>(
             &self,
-            _: &VelocityNet<B>,
+            _: &dyn VelocityField<B>,
             _: Tensor<B, 2>,
             _: Tensor<B, 2>,
             _: VelocityRequest,
@@ -105,7 +104,7 @@ mod tests {
 
         fn pulled_back<B: ModelBackend>(
             &self,
-            _: &VelocityNet<B>,
+            _: &dyn VelocityField<B>,
             x: Tensor<B, 2>,
             _: Tensor<B, 2>,
             w: Tensor<B, 2>,

@@ -11,7 +11,7 @@
 //! weights alone bend it by half its radius at width 128, so the output layer is moved, by regularised
 //! least squares, to where `f` is the distance to the sphere throughout the neighbourhood.
 
-use burn::module::Module;
+use burn::module::{Module, ParamId};
 use burn::tensor::backend::Backend;
 use burn::tensor::{Tensor, TensorData};
 use rand::SeedableRng;
@@ -163,6 +163,11 @@ impl<B: ModelBackend> ImplicitNet<B> {
                 value + rounded.sqrt() - (radius * radius + ROUNDING).sqrt()
             }
         }
+    }
+
+    /// The weight matrices between two hidden layers.
+    pub fn hidden_weights(&self) -> Vec<ParamId> {
+        self.mlp.hidden_weights()
     }
 
     /// What the perceptron reads, `[n, 3 (2 m + 1) + 1]`.

@@ -187,6 +187,12 @@ impl<B: ModelBackend> Mlp<B> {
         &self.layers[self.layers.len() - 1]
     }
 
+    /// The weight matrices between two hidden layers: not those that read the input or give the output.
+    pub(crate) fn hidden_weights(&self) -> Vec<ParamId> {
+        let between = self.hidden().iter().skip(1);
+        between.map(|layer| layer.weight.id).collect()
+    }
+
     pub(crate) fn activation(&self) -> Activation {
         self.activation
     }

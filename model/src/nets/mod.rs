@@ -1,9 +1,11 @@
-//! The networks: the Implicit-Net `f(x, t)`, the Velocity-Net `V(x, t)`, and what both are made of.
+//! What is trained: the Implicit-Net `f(x, t)`, the Velocity-Net `V(x, t)` or a spline in its place, and what
+//! these are made of.
 //!
 //! | file | what |
 //! |---|---|
 //! | [`implicit_net`] | `f(x, t)`, a signed distance that starts as that of a sphere |
 //! | [`velocity_net`] | `V(x)` or `V(x, t)`, which starts close to zero |
+//! | [`spline_velocity`], [`spline_grid`] | `V` of B-splines on a grid, in the place of the Velocity-Net |
 //! | [`mlp`] | the multilayer perceptron inside both |
 //! | [`encoding`] | the positional encoding of the points that enter it |
 //! | `initial` | the initial weights |
@@ -13,12 +15,16 @@
 
 pub mod encoding;
 pub mod implicit_net;
-mod initial;
+pub(crate) mod initial;
 pub mod mlp;
 mod renumber;
+pub mod spline_grid;
+pub mod spline_velocity;
 pub mod velocity_net;
 
 pub use implicit_net::{ImplicitNet, ImplicitNetConfig};
 pub use mlp::{Mlp, MlpConfig};
 pub(crate) use renumber::{apart, renumbered};
+pub use spline_grid::SplineGrid;
+pub use spline_velocity::SplineVelocity;
 pub use velocity_net::{VelocityNet, VelocityNetConfig};

@@ -13,7 +13,7 @@
 //! Time enters at half scale, as a coordinate between -1/2 and 1/2 like those of the points: the first weights
 //! then make V vary with time about as fast as with the position, and not twice as fast.
 
-use burn::module::Module;
+use burn::module::{Module, ParamId};
 use burn::tensor::Tensor;
 use burn::tensor::backend::Backend;
 use rand::SeedableRng;
@@ -92,6 +92,11 @@ impl<B: ModelBackend> VelocityNet<B> {
     /// `[n, 3]`, normalised units per unit of time.
     pub fn forward(&self, x: Tensor<B, 2>, t: Tensor<B, 2>) -> Tensor<B, 2> {
         self.mlp.forward(self.features(x, t))
+    }
+
+    /// The weight matrices between two hidden layers.
+    pub fn hidden_weights(&self) -> Vec<ParamId> {
+        self.mlp.hidden_weights()
     }
 
     /// What the perceptron reads: `[n, 3 (2 m + 1)]`, and a column of time where V depends on it.

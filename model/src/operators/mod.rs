@@ -5,8 +5,10 @@
 //! | [`nested`] | repeated autodiff: the network is lifted onto further levels of autodiff and differentiated there |
 //! | [`forward`] | one sweep of ordinary operations that carries value, tangents and Laplacian through `V` |
 //! | [`reverse`] | one written-out reverse sweep, for `grad f` and `J^T w`, for one direction of the output |
+//! | [`spline`] | the derivatives of B-splines, which are known |
+//! | [`velocity_field`] | the trait of all that may be `V` |
 //!
-//! Both ways stand behind one trait, [`Operators`], and must agree to f32 rounding. Naming: a *jet* is a
+//! The first two ways stand behind one trait, [`Operators`], and must agree to f32 rounding. Naming: a *jet* is a
 //! value together with its derivatives at the same points ([`jets`]).
 //!
 //! What nesting costs depends on the size and on the terms. A whole training step takes 1.8 to 3.0 times as long
@@ -17,13 +19,16 @@ pub mod jets;
 pub(crate) mod length;
 pub mod nested;
 pub mod reverse;
+pub mod spline;
+pub mod velocity_field;
 
 use burn::tensor::Tensor;
 
 pub use self::jets::{ImplicitJet, VelocityJet, VelocityRequest};
 pub use self::length::length;
+pub use self::velocity_field::VelocityField;
 use crate::autodiff::ModelBackend;
-use crate::nets::{ImplicitNet, VelocityNet};
+use crate::nets::ImplicitNet;
 
 /// The derivatives that the objective is made of, at `[n, 3]` positions and `[n, 1]` times.
 ///
@@ -40,7 +45,7 @@ pub trait Operators {
     /// `V`, `J`, and what `request` names.
     fn velocity_jet<B: ModelBackend>(
         &self,
-        net: &VelocityNet<B>,
+        net: &dyn VelocityField<B>,
         x: Tensor<B, 2>,
         t: Tensor<B, 2>,
         request: VelocityRequest,
@@ -49,7 +54,7 @@ pub trait Operators {
     /// `V` and `J^T w` for one direction `w`, `[n, 3]`, per point: a vector-Jacobian product.
     fn pulled_back<B: ModelBackend>(
         &self,
-        net: &VelocityNet<B>,
+        net: &dyn VelocityField<B>,
         x: Tensor<B, 2>,
         t: Tensor<B, 2>,
         w: Tensor<B, 2>,
@@ -80,32 +85,22 @@ impl Operators for Derivatives {
 
     fn velocity_jet<B: ModelBackend>(
         &self,
-        net: &VelocityNet<B>,
+        net: &dyn VelocityField<B>,
         x: Tensor<B, 2>,
         t: Tensor<B, 2>,
         request: VelocityRequest,
     ) -> VelocityJet<B> {
-        let mut jet = match self {
-            Self::Nested => nested::velocity_jet(net, x, t, request),
-            Self::Forward => forward::velocity_jet(net, x, t, request),
-        };
-        if request.rate && !net.time_dependent {
-            jet.rate = Some(jet.value.zeros_like());
-        }
-        jet
+        net.jet(*self, x, t, request)
     }
 
     fn pulled_back<B: ModelBackend>(
         &self,
-        net: &VelocityNet<B>,
+        net: &dyn VelocityField<B>,
         x: Tensor<B, 2>,
         t: Tensor<B, 2>,
         w: Tensor<B, 2>,
     ) -> (Tensor<B, 2>, Tensor<B, 2>) {
-        match self {
-            Self::Nested => nested::pulled_back(net, x, t, w),
-            Self::Forward => reverse::pulled_back(net, x, t, w),
-        }
+        net.pulled_back(*self, x, t, w)
     }
 }
 

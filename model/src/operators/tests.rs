@@ -4,7 +4,7 @@
 use super::*;
 use crate::autodiff::Activation;
 use crate::nets::encoding::encoding_scale;
-use crate::nets::{ImplicitNetConfig, Mlp, VelocityNetConfig};
+use crate::nets::{ImplicitNetConfig, Mlp, VelocityNet, VelocityNetConfig};
 use crate::testing::{Plain, Train, column, host, points, shaken};
 
 const POINTS: [[f64; 3]; 4] = [

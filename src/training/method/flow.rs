@@ -9,7 +9,7 @@ use isomorph_model::{FlowGeometry, Geometry, TrainBackend, VelocityNet};
 
 use super::ends::OnDevice;
 use super::spec::{Acts, Keys, MethodSpec, Needs};
-use super::{Method, Trainee};
+use super::{FIXED_OPTIMISER, Method, Trainee};
 use crate::data::{Bounds, TrainingData};
 use crate::flow_step::FlowStep;
 use crate::motion::Motion;
@@ -45,7 +45,7 @@ pub(super) static FLOW: MethodSpec = MethodSpec {
         training: Keys::All,
     },
     own: None,
-    fixed: &[],
+    fixed: &FIXED_OPTIMISER,
     changes: &[],
 };
 
@@ -72,11 +72,21 @@ impl<B: TrainBackend> EndsAndFlow<B> {
         let ends = EndFieldsConfig { implicit }.init(seed, device);
         // The end fields take `seed` and the one after it.
         let velocity = settings.velocity.init(seed.wrapping_add(2), device);
+        let training = &settings.training;
+        let (hidden, hidden_velocity) = (ends.hidden_weights(), velocity.hidden_weights());
         Self {
             schedule: Schedule::new(&settings.training),
             bounds: bounds.padded(settings.training.box_margin as f32),
-            ends: Trainee::new("ends", ends, device),
-            velocity: Trainee::new("velocity", velocity, device),
+            ends: Trainee::new("ends", ends, device).moved_by(
+                training.optimiser,
+                hidden,
+                [training.learning_rate, training.muon_rate],
+            ),
+            velocity: Trainee::new("velocity", velocity, device).moved_by(
+                training.optimiser,
+                hidden_velocity,
+                [training.velocity_learning_rate, training.velocity_muon_rate],
+            ),
             device: device.clone(),
             settings,
         }

@@ -9,12 +9,14 @@
 //! | `nise.rs` | `nise`, `nise-velocity` |
 //! | `eigenbasis.rs` | `eigenbasis` |
 //! | `nfgp.rs` | `nfgp` |
+//! | `efis.rs` | `efis` |
 //!
 //! Each file holds all that a method is: its [`MethodSpec`] (name, needs, the keys of the recipe that act,
 //! those that it has alone), and its networks and objective, a [`Method`]. Here stand the only list of
 //! them, [`METHODS`], and what follows from it. The loop, the checkpoints, the surfaces and the evaluation
 //! are the same for all.
 
+mod efis;
 mod eigenbasis;
 mod ends;
 mod flow;
@@ -26,14 +28,14 @@ pub mod spline;
 
 use std::io;
 
-use burn::module::AutodiffModule;
-use burn::optim::{GradientsParams, Optimizer};
+use burn::module::{AutodiffModule, ParamId};
+use burn::optim::GradientsParams;
 use isomorph_model::{Geometry, Motion, TrainBackend};
 
 use crate::data::{Bounds, TrainingData};
-use crate::optimiser::{self, AdamOf};
+use crate::optimiser::Optimiser;
 use crate::posed::{Posed, Slopes};
-use crate::recipe::{Change, GeometryKind, Recipe, VelocityKind};
+use crate::recipe::{self, Change, GeometryKind, Recipe, VelocityKind};
 use crate::records::{RecordError, Records};
 use crate::report::{Phase, Rates};
 use crate::samples::Drawn;
@@ -96,6 +98,7 @@ methods! {
         nise::NISE_VELOCITY => Evolved,
         eigenbasis::EIGENBASIS => SineFlow,
         nfgp::NFGP => Deformations,
+        efis::EFIS => EndsAndCouplings,
     }
 }
 
@@ -212,26 +215,46 @@ pub fn fixed_change(before: &Recipe, after: &Recipe) -> Option<(Change, &'static
     })
 }
 
+/// What the fields of this project fix beside their networks.
+const FIXED_OPTIMISER: [(&str, &str); 1] = [(
+    "training.optimiser",
+    "the momenta of a checkpoint are those of its optimiser",
+)];
+
 /// A network with the optimiser that moves it, under the name of its files.
 pub(super) struct Trainee<B: TrainBackend, M: AutodiffModule<B>> {
-    /// `NAME.mpk` and `NAME-optimiser.mpk` in a checkpoint.
+    /// `NAME.mpk` and `NAME-optimiser.mpk` in a checkpoint, and with Muon `NAME-muon-optimiser.mpk`.
     name: &'static str,
     /// The network.
     pub net: M,
-    optimiser: AdamOf<M, B>,
+    optimiser: Optimiser<B, M>,
     device: B::Device,
 }
 
 impl<B: TrainBackend, M: AutodiffModule<B>> Trainee<B, M> {
-    /// A network before its first step.
+    /// A network before its first step, which Adam moves.
     pub(crate) fn new(name: &'static str, net: M, device: &B::Device) -> Self {
-        let optimiser = optimiser::adam();
         Self {
             name,
             net,
-            optimiser,
+            optimiser: Optimiser::adam(),
             device: device.clone(),
         }
+    }
+
+    /// The same with the optimiser of a recipe. Muon moves the matrices `hidden`; `rates` are the first
+    /// learning rates of Adam and of Muon.
+    pub(crate) fn moved_by(
+        mut self,
+        kind: recipe::Optimiser,
+        hidden: Vec<ParamId>,
+        [adam, muon]: [f64; 2],
+    ) -> Self {
+        self.optimiser = match kind {
+            recipe::Optimiser::Adam => Optimiser::adam(),
+            recipe::Optimiser::Muon => Optimiser::muon(hidden, muon / adam),
+        };
+        self
     }
 
     /// The network with a place of its own in the graph: graphs that share no node can be made and
@@ -240,10 +263,10 @@ impl<B: TrainBackend, M: AutodiffModule<B>> Trainee<B, M> {
         M::from_inner(self.net.valid())
     }
 
-    /// One step of the optimiser against the sum of the parts' gradients; see [`optimiser::advance`].
+    /// One step of the optimiser against the sum of the parts' gradients; see [`Optimiser::advance`].
     pub(crate) fn advance(&mut self, parts: Vec<GradientsParams>, rate: f64, clip: f64) {
         let net = self.net.clone();
-        self.net = optimiser::advance(&mut self.optimiser, net, parts, rate, clip);
+        self.net = self.optimiser.advance(net, parts, rate, clip);
     }
 
     /// The network for values.
@@ -254,24 +277,18 @@ impl<B: TrainBackend, M: AutodiffModule<B>> Trainee<B, M> {
     /// Adds the records of network and optimiser.
     pub(crate) fn record(&self, records: &mut Records) -> io::Result<()> {
         records.push::<B>(self.file(), self.net.clone().into_record())?;
-        records.push::<B>(self.optimiser_file(), self.optimiser.to_record())
+        self.optimiser.record(self.name, records)
     }
 
     /// Takes both from records.
     pub(crate) fn restore(&mut self, records: &Records) -> Result<(), RecordError> {
         let net = records.get::<B, M::Record>(&self.file(), &self.device)?;
-        let state = records.get::<B, _>(&self.optimiser_file(), &self.device)?;
+        self.optimiser.restore(self.name, records, &self.device)?;
         self.net = self.net.clone().load_record(net);
-        let fresh = std::mem::replace(&mut self.optimiser, optimiser::adam());
-        self.optimiser = fresh.load_record(state);
         Ok(())
     }
 
     fn file(&self) -> String {
         format!("{}.mpk", self.name)
-    }
-
-    fn optimiser_file(&self) -> String {
-        format!("{}-optimiser.mpk", self.name)
     }
 }

@@ -8,7 +8,7 @@ use burn::module::Module;
 use isomorph_model::{Geometry, ImplicitNet, TrainBackend, VelocityNet};
 
 use super::spec::{Acts, Keys, MethodSpec, Needs};
-use super::{Method, Trainee};
+use super::{FIXED_OPTIMISER, Method, Trainee};
 use crate::data::{Bounds, TrainingData};
 use crate::motion::Motion;
 use crate::network_step::Step;
@@ -37,7 +37,7 @@ pub(super) static NETWORK: MethodSpec = MethodSpec {
         training: Keys::All,
     },
     own: None,
-    fixed: &[],
+    fixed: &FIXED_OPTIMISER,
     changes: &[],
 };
 
@@ -57,10 +57,20 @@ impl<B: TrainBackend> VelocityField<B> {
         let seed = settings.training.seed;
         let implicit = settings.implicit.init(seed, device);
         let velocity = settings.velocity.init(seed.wrapping_add(1), device);
+        let training = &settings.training;
+        let (hidden, hidden_velocity) = (implicit.hidden_weights(), velocity.hidden_weights());
         Self {
             schedule: Schedule::new(&settings.training),
-            implicit: Trainee::new("implicit", implicit, device),
-            velocity: Trainee::new("velocity", velocity, device),
+            implicit: Trainee::new("implicit", implicit, device).moved_by(
+                training.optimiser,
+                hidden,
+                [training.learning_rate, training.muon_rate],
+            ),
+            velocity: Trainee::new("velocity", velocity, device).moved_by(
+                training.optimiser,
+                hidden_velocity,
+                [training.velocity_learning_rate, training.velocity_muon_rate],
+            ),
             device: device.clone(),
             settings,
         }

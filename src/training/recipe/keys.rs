@@ -20,7 +20,7 @@ use super::rule::Rule;
 use super::schema::{Key, Keyed, Section, section};
 use super::words::{
     Activation, Correspondences, DERIVATIVES, GeometryKind, INTEGRATORS, LevelSetForm,
-    NormalSource, Preset, Schedule, TimeSampling, VelocityKind,
+    NormalSource, Optimiser, Preset, Schedule, TimeSampling, VelocityKind,
 };
 
 /// The most steps, points or files of any kind that a recipe may have.
@@ -223,11 +223,19 @@ section! {
         batch: usize = 2_200 | 2_200 | 4_000 | 4_000 | 4_000, Rule::whole(64, 1_000_000);
         /// Correspondences in each step, or all if fewer are known. The paper leaves it open.
         correspondence_batch: usize = 1_000 | 250 | 500 | 1_000 | 1_000, Rule::whole(1, 1_000_000);
+        /// What moves the weights. "muon": Muon moves the matrices between hidden layers, Adam all
+        /// other weights. "adam": Adam moves all weights. A run keeps its optimiser. The paper does not
+        /// name one.
+        optimiser: Optimiser = "adam" | "adam" | "adam" | "adam" | "adam", Rule::word(Optimiser::WORDS);
         /// Learning rate of f. Sine networks take 3e-4 to 5e-4, softplus networks 1e-3 to 2e-3. The
         /// paper uses 0.005.
         learning_rate: f64 = 5e-4 | 5e-4 | 5e-4 | 3e-4 | 5e-3, Rule::above_zero(1.0);
         /// Learning rate of what moves points. The paper has one for both.
         velocity_learning_rate: f64 = 2e-3 | 2e-3 | 1e-3 | 1e-3 | 5e-3, Rule::above_zero(1.0);
+        /// Learning rate of Muon in f.
+        muon_rate: f64 = 2e-3 | 2e-3 | 2e-3 | 2e-3 | 2e-3, Rule::above_zero(1.0);
+        /// Learning rate of Muon in what moves points.
+        velocity_muon_rate: f64 = 1e-2 | 1e-2 | 1e-2 | 1e-2 | 1e-2, Rule::above_zero(1.0);
         /// How learning rates fall: "cosine" over the steps in which a network trains, or "step" as
         /// in the paper.
         schedule: Schedule = "cosine" | "cosine" | "cosine" | "cosine" | "step", Rule::word(Schedule::WORDS);

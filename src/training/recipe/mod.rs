@@ -69,7 +69,7 @@ pub use keys::{
 };
 pub use words::{
     Activation, Correspondences, DERIVATIVES, GeometryKind, INTEGRATORS, LevelSetForm,
-    NormalSource, Preset, Schedule, TimeSampling, VelocityKind,
+    NormalSource, Optimiser, Preset, Schedule, TimeSampling, VelocityKind,
 };
 
 use rule::Value;

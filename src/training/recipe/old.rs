@@ -4,7 +4,8 @@
 //! read as it was meant.
 
 use super::catalogue;
-use super::rule::Rule;
+use super::entry::{Entries, Entry, Place};
+use super::rule::{Rule, Value};
 use super::schema::Key;
 
 /// Keys that had another place until version 0.1, with their present one.
@@ -39,6 +40,18 @@ const fn removed(field: &'static str) -> Key {
         doc: "A term of version 0.1.",
         rule: Rule::positive_or_zero(),
         columns: ["0"; 5],
+    }
+}
+
+/// What runs did before there was a key for it, in the words of a recipe, whatever their preset says now.
+const BEFORE: [(&str, &str); 1] = [("training.optimiser", "adam")];
+
+/// Gives the recipe of a run that an earlier version wrote what it meant without a key.
+pub(super) fn complete(entries: &mut Entries) {
+    for (id, word) in BEFORE {
+        let key = catalogue::by_id(id).expect("a key of the table");
+        let meant = || Entry::new(key, Value::Text(word.to_owned()), Place::Held);
+        entries.entry(key.id()).or_insert_with(meant);
     }
 }
 

@@ -13,7 +13,7 @@ use super::schema::{Key, Keyed, Section};
 use super::setting::Setting;
 use super::source::Reading;
 use super::words::{GeometryKind, Preset, VelocityKind};
-use super::{MethodRecipe, Recipe, acting, catalogue, consistency, frames, source};
+use super::{MethodRecipe, Recipe, acting, catalogue, consistency, frames, old, source};
 use crate::method::{self, MethodSpec};
 
 impl Recipe {
@@ -148,7 +148,10 @@ fn resolve(
     let spec = chosen(|key| given(key).or_else(|| key.preset_value(preset)));
     match notes {
         None => acting::settle(&mut entries, spec)?,
-        Some(notes) => acting::settle_stored(&mut entries, spec, notes),
+        Some(notes) => {
+            old::complete(&mut entries);
+            acting::settle_stored(&mut entries, spec, notes);
+        }
     }
     let frames = frames::read(&entries, origin)?;
     for key in catalogue::keys().filter(|key| spec.acts_on(key)) {

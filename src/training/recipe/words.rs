@@ -116,6 +116,14 @@ words! {
         Olse = "olse",
     }
 
+    /// What moves the weights against their gradients.
+    Optimiser {
+        /// Adam for all weights.
+        Adam = "adam",
+        /// Muon for the matrices between hidden layers, Adam for all other weights.
+        Muon = "muon",
+    }
+
     /// How the learning rates fall over the steps.
     Schedule {
         /// Along half a cosine wave down to `final-learning-rate`.

@@ -9,12 +9,13 @@ use crate::recipe::{ImplicitRecipe, LossRecipe, TrainingRecipe, VelocityRecipe};
 const STEPS: usize = 4;
 
 /// Changes under which no key is switched off by another.
-const ALL_ON: [&str; 14] = [
+const ALL_ON: [&str; 15] = [
     "training.steps=4",
     "training.warm-up=0.25",
     "training.ramp-until=0.5",
     "training.velocity-until=0.75",
     "training.clip=0.01",
+    "training.optimiser=adam",
     "training.schedule=step",
     "training.decay-every=0.25",
     "training.times=grid",
@@ -27,7 +28,7 @@ const ALL_ON: [&str; 14] = [
 ];
 
 /// Another value of each key of the sections that methods share, and what that needs.
-const OTHER: [(&str, &[&str]); 55] = [
+const OTHER: [(&str, &[&str]); 58] = [
     ("implicit.depth=3", &[]),
     ("implicit.width=9", &[]),
     ("implicit.activation=sine", &[]),
@@ -65,8 +66,14 @@ const OTHER: [(&str, &[&str]); 55] = [
     ("training.steps=8", &[]),
     ("training.batch=176", &[]),
     ("training.correspondence-batch=16", &[]),
+    ("training.optimiser=muon", &[]),
     ("training.learning-rate=1e-3", &[]),
     ("training.velocity-learning-rate=1e-3", &[]),
+    ("training.muon-rate=1e-3", &["training.optimiser=muon"]),
+    (
+        "training.velocity-muon-rate=1e-3",
+        &["training.optimiser=muon"],
+    ),
     ("training.schedule=cosine", &[]),
     ("training.decay=0.25", &[]),
     ("training.decay-every=0.5", &[]),

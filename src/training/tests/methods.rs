@@ -5,6 +5,7 @@ use burn::tensor::Tensor;
 use super::samples::first_layer;
 use super::*;
 use crate::method::{self, fixed_change, names, spec_of};
+use crate::recipe::Optimiser;
 
 #[test]
 fn the_end_fields_of_a_flow_train_in_every_step_and_its_velocity_as_the_schedule_says() {
@@ -45,11 +46,22 @@ fn the_surface_term_of_a_flow_moves_its_velocity_and_leaves_the_end_fields_alone
     assert_ne!(v, bare_v);
 }
 
+/// The small recipe of a method with each optimiser that it can have.
+fn optimised(spec: &'static MethodSpec) -> Vec<(&'static MethodSpec, Recipe)> {
+    let with = |word: &&str| {
+        let mut recipe = recipe_of(spec, &[]);
+        let change = format!("training.optimiser={word}");
+        let chosen = recipe.has("training.optimiser") && recipe.with(&change).is_ok();
+        (chosen || *word == "adam").then_some((spec, recipe))
+    };
+    Optimiser::WORDS.iter().filter_map(with).collect()
+}
+
 #[test]
 fn every_method_trains_and_resumes_to_the_same_weights() {
-    for spec in trained() {
-        let (data, name) = (data(), spec.described());
-        let recipe = recipe_of(spec, &[]);
+    for (spec, recipe) in trained().flat_map(optimised) {
+        let (data, optimiser) = (data(), recipe.training.optimiser);
+        let name = format!("{}, {optimiser}", spec.described());
         let mut whole = build(&recipe, &data);
         let mut eighth = None;
         for step in 0..10 {
@@ -134,6 +146,7 @@ fn the_list_of_methods_has_every_name_and_finds_each_method_again() {
         "nise-velocity",
         "eigenbasis",
         "nfgp",
+        "efis",
     ];
     assert_eq!(names(), wanted);
     for spec in METHODS {
@@ -167,6 +180,10 @@ fn a_run_that_has_begun_keeps_its_method_its_networks_and_what_is_shared_out() {
     assert_eq!(
         key(&[], &["velocity.width=9"]).as_deref(),
         Some("velocity.width")
+    );
+    assert_eq!(
+        key(&["training.optimiser=adam"], &["training.optimiser=muon"]).as_deref(),
+        Some("training.optimiser")
     );
     assert_eq!(key(&[nise], &[nise, "nise.residual=1"]), None);
     let steps = key(&[nise], &[nise, "training.steps=20"]);
