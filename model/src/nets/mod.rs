@@ -15,7 +15,7 @@
 
 pub mod encoding;
 pub mod implicit_net;
-pub(crate) mod initial;
+mod initial;
 pub mod mlp;
 mod renumber;
 pub mod spline_grid;
