@@ -11,7 +11,7 @@
 //!    mistake would lose a whole piece, and times 1.25 below it. If finer nodes show a slope steeper than
 //!    was assumed, the descent starts again with that slope. The last halving, which costs most, keeps
 //!    no more than what a sheet or a thread through the cell needs: the mean distance of its corners
-//!    from a line through its middle is `s / sqrt 2`, from a plane at most `0.65 s`.
+//!    from a line through its middle is `s / sqrt 2`, from a plane through it at most `s / 2`.
 //! 3. **Follow**: wherever two neighbouring nodes differ in sign, all cells round their edge are
 //!    completed, until that leads nowhere new. So no hole can come from step 2.
 

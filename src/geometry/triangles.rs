@@ -132,13 +132,9 @@ impl TriangleSearch {
                 }
                 continue;
             }
-            let children = (index + 1, node.second);
-            let away = (
-                to_box(&self.nodes[children.0 as usize], x),
-                to_box(&self.nodes[children.1 as usize], x),
-            );
-            let (first, second) = ((children.0, away.0), (children.1, away.1));
-            let (nearer, farther) = if away.0 <= away.1 {
+            let with_distance = |child: u32| (child, to_box(&self.nodes[child as usize], x));
+            let (first, second) = (with_distance(index + 1), with_distance(node.second));
+            let (nearer, farther) = if first.1 <= second.1 {
                 (first, second)
             } else {
                 (second, first)

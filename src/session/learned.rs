@@ -78,7 +78,7 @@ pub(super) fn load(
 ) -> Result<Learned> {
     let state = &checkpoint.state;
     let mut trainer: Box<dyn Trainer> = if is_solved(recipe) {
-        Box::new(Solved::unset(recipe))
+        Box::new(Solved::unset())
     } else {
         engine.method(recipe, &state.bounds)?
     };

@@ -103,8 +103,8 @@ impl SignedDistance {
     }
 
     /// The same with a surface that is smoothed where the points are noisy: planes are averaged with Gaussian
-    /// weights of a width that grows with the noise, see [`CURVATURE`] (implicit moving least squares; Kolluri, "Provably good
-    /// moving least squares", 2005). Without noise it is [`Self::new`].
+    /// weights of a width that grows with the noise, see [`CURVATURE`] (implicit moving least squares; Kolluri,
+    /// "Provably good moving least squares", 2005). Where that takes no more planes it is [`Self::new`].
     ///
     /// # Panics
     /// As [`Self::new`].
@@ -162,7 +162,7 @@ impl SignedDistance {
             let k = neighbour.index as usize;
             let normal = self.normals[k].map(f64::from);
             let weight = match self.planes.width {
-                // Relative to the closest one, which is never 0.
+                // Over that of the closest point, so that not all of them round to 0.
                 Some(width) => (-(neighbour.squared_distance - closest) / (width * width)).exp(),
                 None => 1.0 / (neighbour.squared_distance + 1e-3 * reach),
             };

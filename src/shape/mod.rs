@@ -10,6 +10,7 @@
 //! | `normals.rs` | normals of a raw cloud, pointing outwards |
 //! | `correspond.rs` | pairs of vertices that are known to correspond |
 //! | `normalise.rs` | the joint frame in which the networks work, and the way back |
+//! | `points.rs` | the points, normals and closed mesh of one shape |
 //! | `keyframes.rs` | all of it in order: shapes in, [`Keyframes`] ready for training out |
 //!
 //! The files are read in [`crate::formats`], points and meshes are measured in [`crate::geometry`].
@@ -23,6 +24,7 @@ mod far;
 mod keyframes;
 mod normalise;
 mod normals;
+mod points;
 mod reconstruct;
 mod sample;
 mod solid;
@@ -30,10 +32,10 @@ mod solid;
 pub(crate) use crate::formats::{FEWEST_POINTS, Shape, ShapeError};
 pub(crate) use crate::geometry::{Bounds, NeighbourSearch};
 pub(crate) use correspond::Correspondences;
-pub(crate) use keyframes::points_of;
-pub(crate) use keyframes::{CorrespondenceSource, DataOptions, NormalSource, prepare};
+pub(crate) use keyframes::{CorrespondenceSource, DataOptions, prepare};
 pub use keyframes::{Keyframe, Keyframes, PointCloud};
 pub(crate) use normalise::Normalisation;
 pub(crate) use normals::estimate_normals;
+pub(crate) use points::{NormalSource, points_of};
 pub(crate) use sample::{SurfaceSamples, sample_surface};
 pub(crate) use solid::{Solid, SolidParts};

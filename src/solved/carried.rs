@@ -54,17 +54,15 @@ impl CarriedShapes {
         time: f64,
         distances: impl Fn(&Solid, &[[f32; 3]]) -> Vec<f32>,
     ) -> Vec<f32> {
-        let t = time as f32;
         let of = |end: usize| {
-            // What has no weight is not computed.
-            if (end == 0 && t >= 1.0) || (end == 1 && t <= 0.0) {
+            if has_no_weight(end, time) {
                 return vec![0.0; ends.len()];
             }
             let place = |both: &[f32; 6]| [both[3 * end], both[3 * end + 1], both[3 * end + 2]];
             let places: Vec<[f32; 3]> = ends.iter().map(place).collect();
             distances(&self.shapes[end], &places)
         };
-        let (g, h) = (of(0), of(1));
+        let (g, h, t) = (of(0), of(1), time as f32);
         let blend = |(g, h): (&f32, &f32)| (1.0 - t) * g + t * h;
         g.iter().zip(&h).map(blend).collect()
     }
@@ -93,12 +91,15 @@ impl SurfaceField for CarriedShapes {
     /// The gradient of each distance where the point comes from, carried back by the transpose of the motion's
     /// derivative: that of the integrator's own steps, so that it is the gradient of [`Self::values`].
     fn gradients(&self, points: &[[f32; 3]], time: f64) -> Vec<[f32; 3]> {
-        let [g, h] = [0.0, 1.0].map(|end| {
-            let shape = &self.shapes[usize::from(end > 0.5)];
-            let steps = self.share(time, end);
+        let [g, h] = [0, 1].map(|end: usize| {
+            if has_no_weight(end, time) {
+                return vec![[0.0; 3]; points.len()];
+            }
+            let (shape, until) = (&self.shapes[end], end as f64);
+            let steps = self.share(time, until);
             let there = self
                 .field
-                .carry_with_gradient(points, time as f32, end as f32, steps);
+                .carry_with_gradient(points, time as f32, until as f32, steps);
             let places: Vec<[f32; 3]> = there.iter().map(|carried| carried.point).collect();
             let slopes = shape.gradients(&places).into_iter();
             let back = slopes
@@ -157,4 +158,9 @@ impl PointMotion for CarriedShapes {
 
 fn transposed(m: &[[f32; 3]; 3], x: [f32; 3]) -> [f32; 3] {
     [0, 1, 2].map(|j| m[0][j] * x[0] + m[1][j] * x[1] + m[2][j] * x[2])
+}
+
+/// Whether the blend at a time does not depend on an end: then nothing of it is computed.
+fn has_no_weight(end: usize, time: f64) -> bool {
+    if end == 0 { time >= 1.0 } else { time <= 0.0 }
 }

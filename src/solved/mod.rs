@@ -33,23 +33,25 @@ use crate::shape::{Keyframe, Keyframes, Solid, SolidParts};
 
 /// A field of splines between two shapes, solved for step by step.
 pub(crate) struct Solved {
-    /// What makes the steps; none of a run that is only looked at.
-    solver: Option<Solver>,
-    /// The field and the shapes, once there are any.
-    state: Option<State>,
-    weights: Weights,
+    motion: Motion,
+    /// Steps done.
+    step: usize,
+    /// What the field carries; none before the checkpoint of a run that is only looked at is read.
+    shapes: Option<Arc<[Solid; 2]>>,
+}
+
+/// Where the field is.
+enum Motion {
+    /// With what makes the steps.
+    Sought(Box<Solver>),
+    /// Of a checkpoint that is only looked at.
+    Found(SplineField),
+    /// Of one that is not read yet.
+    Unread,
 }
 
 /// Least weight of the strain: without any the field would be free between the samples.
 const LEAST_STRAIN: f64 = 1e-3;
-
-/// What a checkpoint holds.
-struct State {
-    field: SplineField,
-    /// Steps done.
-    step: usize,
-    shapes: Arc<[Solid; 2]>,
-}
 
 impl Solved {
     /// Before the first step.
@@ -64,47 +66,52 @@ impl Solved {
             ));
         };
         let (source, target) = (solid(first, "source")?, solid(last, "target")?);
-        let weights = weights(recipe);
-        let problem = problem(recipe, keyframes);
-        let solver = Solver::new(problem, weights, options(recipe));
+        let solver = Solver::new(problem(recipe, keyframes), weights(recipe), options(recipe));
         let solver = solver.map_err(|error| format!("velocity.kind = \"spline\": {error}"))?;
         Ok(Self {
-            state: Some(State {
-                field: solver.field().clone(),
-                step: 0,
-                shapes: Arc::new([source, target]),
-            }),
-            solver: Some(solver),
-            weights,
+            motion: Motion::Sought(Box::new(solver)),
+            step: 0,
+            shapes: Some(Arc::new([source, target])),
         })
     }
 
     /// Without shapes, to take those of a checkpoint.
-    pub(crate) fn unset(recipe: &Recipe) -> Self {
+    pub(crate) fn unset() -> Self {
         Self {
-            solver: None,
-            state: None,
-            weights: weights(recipe),
+            motion: Motion::Unread,
+            step: 0,
+            shapes: None,
         }
     }
 
-    fn state(&self) -> &State {
-        let state = self.state.as_ref();
-        state.expect("a run is looked at after its checkpoint is read")
+    fn field(&self) -> &SplineField {
+        match &self.motion {
+            Motion::Sought(solver) => solver.field(),
+            Motion::Found(field) => field,
+            Motion::Unread => unreachable!("{READ_FIRST}"),
+        }
+    }
+
+    fn shapes(&self) -> &Arc<[Solid; 2]> {
+        self.shapes.as_ref().expect(READ_FIRST)
     }
 }
 
+/// Whoever makes a [`Solved`] without shapes restores it next.
+const READ_FIRST: &str = "a run is looked at after its checkpoint is read";
+
 impl Trainer for Solved {
     fn advance(&mut self, _: &TrainingData, step: usize, read: bool) -> Option<Vec<TermReport>> {
-        let solver = self.solver.as_mut();
-        let solver = solver.expect("a run that is only looked at is not trained");
+        let Motion::Sought(solver) = &mut self.motion else {
+            unreachable!("a run that is only looked at is not trained");
+        };
         let Weights {
             matching,
             on_surface,
             strain,
             divergence,
             screw,
-        } = self.weights;
+        } = *solver.weights();
         let term = |name, weight: f64, raw: f64| TermReport {
             name,
             raw,
@@ -119,10 +126,7 @@ impl Trainer for Solved {
                     divergence: diverged,
                     screw: unsteady,
                 } = report.terms;
-                if let Some(state) = &mut self.state {
-                    state.field = solver.field().clone();
-                    state.step = step + 1;
-                }
+                self.step = step + 1;
                 read.then(|| {
                     vec![
                         term("matching", matching, matched),
@@ -149,48 +153,41 @@ impl Trainer for Solved {
     }
 
     fn networks(&self) -> Vec<(&'static str, usize)> {
-        let count = self.state().field.coefficients().len();
+        let count = self.field().coefficients().len();
         vec![("V (spline)", count)]
     }
 
     fn records(&self) -> io::Result<Records> {
-        let State {
-            field,
-            step,
-            shapes,
-        } = self.state();
-        stored::records(field, *step, shapes)
+        stored::records(self.field(), self.step, self.shapes())
     }
 
     fn restore(&mut self, records: &Records) -> Result<(), RecordError> {
         let (field, step, parts) = stored::read(records)?;
-        if let Some(solver) = &mut self.solver {
-            let resumed = solver.resume_from(field.clone(), step);
-            resumed.map_err(|error| stored::misfit(&error))?;
+        match &mut self.motion {
+            Motion::Sought(solver) => {
+                let resumed = solver.resume_from(field, step);
+                resumed.map_err(|error| stored::misfit(&error))?;
+            }
+            motion => {
+                self.shapes = Some(Arc::new(stored::shapes(parts)?));
+                *motion = Motion::Found(field);
+            }
         }
-        let shapes = match self.state.take() {
-            Some(state) => state.shapes,
-            None => Arc::new(stored::shapes(parts)?),
-        };
-        self.state = Some(State {
-            field,
-            step,
-            shapes,
-        });
+        self.step = step;
         Ok(())
     }
 
     fn deformation(&self) -> Box<dyn Deformation> {
-        let State { field, shapes, .. } = self.state();
-        Box::new(CarriedShapes::new(field.clone(), Arc::clone(shapes)))
+        let shapes = Arc::clone(self.shapes());
+        Box::new(CarriedShapes::new(self.field().clone(), shapes))
     }
 }
 
 fn solid(key: &Keyframe, name: &str) -> Result<Solid, String> {
     let parts = SolidParts::of(key).ok_or_else(|| {
         format!(
-            "velocity.kind = \"spline\": the {name} is no closed mesh, and has no normals that close it; set data.normals \
-             to \"auto\", or choose the preset \"quick\""
+            "velocity.kind = \"spline\": the {name} is no closed mesh, and has no normals that close it; set \
+             data.normals to \"auto\", or choose the preset \"quick\""
         )
     })?;
     let solid = Solid::new(parts);

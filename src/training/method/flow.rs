@@ -75,18 +75,10 @@ impl<B: TrainBackend> EndsAndFlow<B> {
         let training = &settings.training;
         let (hidden, hidden_velocity) = (ends.hidden_weights(), velocity.hidden_weights());
         Self {
-            schedule: Schedule::new(&settings.training),
+            schedule: Schedule::new(training),
             bounds: bounds.padded(settings.training.box_margin as f32),
-            ends: Trainee::new("ends", ends, device).moved_by(
-                training.optimiser,
-                hidden,
-                [training.learning_rate, training.muon_rate],
-            ),
-            velocity: Trainee::new("velocity", velocity, device).moved_by(
-                training.optimiser,
-                hidden_velocity,
-                [training.velocity_learning_rate, training.velocity_muon_rate],
-            ),
+            ends: Trainee::of_field("ends", ends, hidden, training, device),
+            velocity: Trainee::of_motion("velocity", velocity, hidden_velocity, training, device),
             device: device.clone(),
             settings,
         }

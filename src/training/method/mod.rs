@@ -33,7 +33,7 @@ use isomorph_model::{Geometry, Motion, TrainBackend};
 use crate::data::{Bounds, TrainingData};
 use crate::optimiser::Optimiser;
 use crate::posed::{Posed, Slopes};
-use crate::recipe::{self, Change, GeometryKind, Recipe, VelocityKind};
+use crate::recipe::{self, Change, GeometryKind, Recipe, TrainingRecipe, VelocityKind};
 use crate::records::{RecordError, Records};
 use crate::report::{Phase, Rates};
 use crate::samples::Drawn;
@@ -239,9 +239,33 @@ impl<B: TrainBackend, M: AutodiffModule<B>> Trainee<B, M> {
         }
     }
 
-    /// The same with the optimiser of a recipe. Muon moves the matrices `hidden`; `rates` are the first
-    /// learning rates of Adam and of Muon.
-    pub(crate) fn moved_by(
+    /// A network of `f` before its first step, with the optimiser of the recipe and its rates for `f`.
+    /// Muon moves the matrices `hidden`.
+    fn of_field(
+        name: &'static str,
+        net: M,
+        hidden: Vec<ParamId>,
+        training: &TrainingRecipe,
+        device: &B::Device,
+    ) -> Self {
+        let rates = [training.learning_rate, training.muon_rate];
+        Self::new(name, net, device).moved_by(training.optimiser, hidden, rates)
+    }
+
+    /// The same of what moves points.
+    fn of_motion(
+        name: &'static str,
+        net: M,
+        hidden: Vec<ParamId>,
+        training: &TrainingRecipe,
+        device: &B::Device,
+    ) -> Self {
+        let rates = [training.velocity_learning_rate, training.velocity_muon_rate];
+        Self::new(name, net, device).moved_by(training.optimiser, hidden, rates)
+    }
+
+    /// The same network with this optimiser; the first learning rates of Adam and of Muon.
+    fn moved_by(
         mut self,
         kind: recipe::Optimiser,
         hidden: Vec<ParamId>,

@@ -60,17 +60,9 @@ impl<B: TrainBackend> VelocityField<B> {
         let training = &settings.training;
         let (hidden, hidden_velocity) = (implicit.hidden_weights(), velocity.hidden_weights());
         Self {
-            schedule: Schedule::new(&settings.training),
-            implicit: Trainee::new("implicit", implicit, device).moved_by(
-                training.optimiser,
-                hidden,
-                [training.learning_rate, training.muon_rate],
-            ),
-            velocity: Trainee::new("velocity", velocity, device).moved_by(
-                training.optimiser,
-                hidden_velocity,
-                [training.velocity_learning_rate, training.velocity_muon_rate],
-            ),
+            schedule: Schedule::new(training),
+            implicit: Trainee::of_field("implicit", implicit, hidden, training, device),
+            velocity: Trainee::of_motion("velocity", velocity, hidden_velocity, training, device),
             device: device.clone(),
             settings,
         }
