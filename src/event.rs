@@ -7,6 +7,7 @@ use std::fmt;
 use std::path::PathBuf;
 use std::time::Duration;
 
+pub use crate::matching::MatchStage;
 pub use isomorph_training::report::{Phase, TermReport};
 
 #[path = "event_line.rs"]
@@ -37,7 +38,7 @@ pub struct StepReport {
     pub peak_memory_bytes: Option<u64>,
 }
 
-/// Something that happened during training, extraction or measuring.
+/// Something that happened during matching, training, extraction or measuring.
 #[non_exhaustive]
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {
@@ -60,8 +61,15 @@ pub enum Event {
     },
     /// Something that a user should read, in a sentence.
     Note(String),
-    /// Pairs of the shapes are being found, which takes about half a minute.
-    Matching,
+    /// Pairs of two shapes are being found, which takes a few seconds.
+    Matching {
+        /// What is done now.
+        stage: MatchStage,
+        /// Steps of the stage that are done: 0 as it begins.
+        done: usize,
+        /// Steps of the stage.
+        total: usize,
+    },
     /// Pairs of two shapes were found before training.
     Matched {
         /// How many.
@@ -155,6 +163,10 @@ impl fmt::Display for Event {
         match self {
             Self::Tick { step } => write!(formatter, "step {step}"),
             Self::Measuring { done, total } => write!(formatter, "measured {done} of {total}"),
+            Self::Matching { stage, done, total } if *done > 0 => {
+                let percent = (100 * done).checked_div(*total).unwrap_or(100);
+                write!(formatter, "finding pairs: {stage}, {percent} %")
+            }
             _ => formatter.write_str(&self.line(None).unwrap_or_default()),
         }
     }

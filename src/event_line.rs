@@ -18,8 +18,8 @@ const NAMED_TERMS: usize = 3;
 /// `left` is how long the remaining steps may take.
 pub(super) fn line(event: &Event, left: Option<Duration>) -> Option<String> {
     Some(match event {
-        Event::Tick { .. } | Event::Measuring { .. } => return None,
-        Event::Matching => "finding pairs of the two shapes".to_owned(),
+        Event::Matching { stage, done: 0, .. } => format!("finding pairs: {stage}"),
+        Event::Tick { .. } | Event::Measuring { .. } | Event::Matching { .. } => return None,
         Event::Started { .. } => return started(event),
         Event::Note(text) => format!("note: {}", text.replace('\n', " ")),
         Event::Matched { .. } => return matched(event),

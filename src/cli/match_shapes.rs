@@ -9,7 +9,7 @@ use isomorph::Shape;
 use isomorph::correspondence::{MatchOptions, Matching, Rigid, find};
 use serde::Serialize;
 
-use super::{Failure, Result, print};
+use super::{Failure, QuietArgs, Result, print};
 
 /// Find pairs of corresponding points of two shapes
 ///
@@ -62,6 +62,9 @@ pub(super) struct MatchArgs {
     /// Print JSON
     #[arg(long)]
     json: bool,
+
+    #[command(flatten)]
+    quiet: QuietArgs,
 }
 
 pub(super) fn run(args: MatchArgs) -> Result {
@@ -84,7 +87,8 @@ pub(super) fn run(args: MatchArgs) -> Result {
         seed: args.seed,
     };
     let (source, target) = (Shape::read(&args.source)?, Shape::read(&args.target)?);
-    let matching = find(&source, &target, &options)?;
+    let mut terminal = args.quiet.terminal(&args.output);
+    let matching = find(&source, &target, &options, |event| terminal.show(event))?;
     matching.write_pairs(&args.output)?;
     if let Some(path) = &args.picture {
         matching.write_picture(path)?;

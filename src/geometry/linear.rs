@@ -109,7 +109,7 @@ pub(crate) fn mean(points: impl Iterator<Item = [f64; 3]> + Clone) -> [f64; 3] {
 /// `M x`.
 #[inline]
 pub(crate) fn times(m: &Matrix, x: [f64; 3]) -> [f64; 3] {
-    [0, 1, 2].map(|row| dot(m[row], x))
+    [dot(m[0], x), dot(m[1], x), dot(m[2], x)]
 }
 
 /// `A B`.
@@ -129,6 +129,7 @@ pub(crate) fn determinant(m: &Matrix) -> f64 {
 }
 
 /// `m += weight y x^T`.
+#[inline]
 pub(crate) fn add_outer(m: &mut Matrix, weight: f64, y: [f64; 3], x: [f64; 3]) {
     for row in 0..3 {
         for column in 0..3 {

@@ -9,17 +9,17 @@
 //! where `x_i` is where node `i` is pulled to and the symmetric 3 x 3 matrix `B_i` how strongly and
 //! in which directions; the second sum goes over both directions of each tie. `R_i` is the rotation
 //! nearest to what the ties of `i` do. Rotations and places are renewed in turn (Sorkine and Alexa,
-//! "As-rigid-as-possible surface modeling", SGP 2007), places by conjugate gradients.
+//! "As-rigid-as-possible surface modeling", SGP 2007), places by conjugate gradients preconditioned
+//! by the 3 x 3 blocks of the nodes.
 //!
 //! The weights `w_ij = 1 / (1 + (s_ij / rho)^2)^2`, with `s_ij` the relative stretch of a tie, let
 //! a few ties stretch much instead of many a little: bodies bend at joints. They are those of the
 //! robust function `rho^2 s^2 / (rho^2 + s^2)` of Geman and McClure (1985), minimised by
 //! reweighting.
 
-use isomorph_model::linear::{Until, conjugate_gradient};
-
+use super::level::NodeMotion;
 use super::rotation::nearest_rotation;
-use super::surface::NodeMotion;
+use super::system::{InverseFactor, Neighbours, System};
 use crate::geometry::linear::{Matrix, add, add_outer, difference, dot, length, scaled, times};
 
 /// The least weight of a tie: even a joint holds together.
@@ -28,12 +28,6 @@ const LEAST_WEIGHT: f64 = 1e-3;
 /// Of the ties' moments this share of the present rotation is added, so that a node whose ties lie
 /// on a line keeps its turn about that line.
 const KEPT_TURN: f64 = 1e-3;
-
-/// Where conjugate gradients end; the next round starts from there.
-const UNTIL: Until = Until {
-    steps: 60,
-    tolerance: 1e-5,
-};
 
 /// What pulls a node.
 #[derive(Debug, Clone, Copy)]
@@ -53,24 +47,51 @@ pub(super) struct Stiffness {
     pub give: f64,
 }
 
+/// Two nodes that are tied.
+#[derive(Debug, Clone, Copy)]
+struct Tie {
+    ends: [u32; 2],
+    /// `y_i - y_j`.
+    along: [f64; 3],
+}
+
+impl Tie {
+    /// `y_i - y_j` turned as the ends are.
+    fn turned(&self, turns: &[Matrix]) -> [f64; 3] {
+        let [i, j] = self.ends;
+        let (i, j) = (&turns[i as usize], &turns[j as usize]);
+        scaled(add(times(i, self.along), times(j, self.along)), 0.5)
+    }
+
+    /// `z_i - z_j`.
+    fn now(&self, places: &[[f64; 3]]) -> [f64; 3] {
+        let [i, j] = self.ends;
+        difference(places[i as usize], places[j as usize])
+    }
+}
+
 /// Nodes, their ties and where they are.
 #[derive(Debug, Clone)]
 pub(super) struct ElasticNodes {
-    rest: Vec<[f64; 3]>,
-    ties: Vec<[u32; 2]>,
+    ties: Vec<Tie>,
     weights: Vec<f64>,
+    neighbours: Neighbours,
     /// Where the nodes are now.
     pub motion: NodeMotion,
 }
 
 impl ElasticNodes {
     /// Nodes at `rest` that have been moved to `motion`.
-    pub(super) fn new(rest: Vec<[f64; 3]>, ties: Vec<[u32; 2]>, motion: NodeMotion) -> Self {
-        let weights = vec![1.0; ties.len()];
+    pub(super) fn new(rest: &[[f64; 3]], ties: &[[u32; 2]], motion: NodeMotion) -> Self {
+        let tie = |&ends: &[u32; 2]| {
+            let [i, j] = ends.map(|node| rest[node as usize]);
+            let along = difference(i, j);
+            Tie { ends, along }
+        };
         Self {
-            rest,
-            ties,
-            weights,
+            neighbours: Neighbours::new(rest.len(), ties),
+            weights: vec![1.0; ties.len()],
+            ties: ties.iter().map(tie).collect(),
             motion,
         }
     }
@@ -78,7 +99,7 @@ impl ElasticNodes {
     /// Moves the nodes towards what pulls them: `rounds` times rotations, weights and places in
     /// turn.
     pub(super) fn relax(&mut self, pulls: &[Pull], resistance: Stiffness, rounds: usize) {
-        assert_eq!(pulls.len(), self.rest.len(), "one pull per node");
+        assert_eq!(pulls.len(), self.motion.places.len(), "one pull per node");
         for _ in 0..rounds {
             // Each of the three lowers the same energy while the other two are held.
             self.renew_weights(resistance.give);
@@ -89,42 +110,36 @@ impl ElasticNodes {
         self.renew_rotations();
     }
 
-    /// `y_i - y_j` turned as the ends of the tie are.
-    fn turned(&self, [i, j]: [u32; 2]) -> [f64; 3] {
-        let (i, j) = (i as usize, j as usize);
-        let along = difference(self.rest[i], self.rest[j]);
-        let turns = &self.motion.rotations;
-        scaled(add(times(&turns[i], along), times(&turns[j], along)), 0.5)
-    }
-
     fn renew_weights(&mut self, give: f64) {
-        let weight = |&tie: &[u32; 2]| {
-            let [i, j] = tie.map(|node| self.motion.places[node as usize]);
-            let turned = self.turned(tie);
-            let stretch = difference(difference(i, j), turned);
-            let [from, to] = tie.map(|node| self.rest[node as usize]);
-            let length = difference(from, to);
+        let NodeMotion { places, rotations } = &self.motion;
+        let weight = |tie: &Tie| {
+            let stretch = difference(tie.now(places), tie.turned(rotations));
             // Relative to the tie's length: the same limit holds for short and long ties.
-            let square = dot(stretch, stretch) / dot(length, length);
-            (1.0 + square / (give * give)).powi(-2).max(LEAST_WEIGHT)
+            let square = dot(stretch, stretch) / dot(tie.along, tie.along);
+            let relative = 1.0 + square / (give * give);
+            (relative * relative).recip().max(LEAST_WEIGHT)
         };
         self.weights = self.ties.iter().map(weight).collect();
     }
 
     fn renew_rotations(&mut self) {
-        let mut moments = vec![[[0.0; 3]; 3]; self.rest.len()];
-        let places = &self.motion.places;
-        for (&[i, j], &weight) in self.ties.iter().zip(&self.weights) {
-            let (i, j) = (i as usize, j as usize);
-            let now = difference(places[i], places[j]);
-            let then = difference(self.rest[i], self.rest[j]);
+        let mut moments = vec![[[0.0; 3]; 3]; self.motion.places.len()];
+        for (tie, &weight) in self.ties.iter().zip(&self.weights) {
             // Seen from the other end both vectors change sign, and their product does not.
-            add_outer(&mut moments[i], weight, now, then);
-            add_outer(&mut moments[j], weight, now, then);
+            let mut moment = [[0.0; 3]; 3];
+            add_outer(&mut moment, weight, tie.now(&self.motion.places), tie.along);
+            for node in tie.ends {
+                let sum = &mut moments[node as usize];
+                *sum = [
+                    add(sum[0], moment[0]),
+                    add(sum[1], moment[1]),
+                    add(sum[2], moment[2]),
+                ];
+            }
         }
         for (turn, mut moment) in self.motion.rotations.iter_mut().zip(moments) {
             // The bias is relative to the moment's size, so that it acts alike at any scale.
-            let size = length(moment.map(length));
+            let size = length([length(moment[0]), length(moment[1]), length(moment[2])]);
             for row in 0..3 {
                 moment[row] = add(moment[row], scaled(turn[row], KEPT_TURN * size));
             }
@@ -140,52 +155,37 @@ impl ElasticNodes {
         // Each tie counts in both directions, and its derivative by each end has another factor of
         // 2, of which one is shared with the pulls.
         let stiffness = 2.0 * stiffness;
-        let mut wanted: Vec<[f64; 3]> = pulls
-            .iter()
-            .map(|pull| times(&pull.strength, pull.to))
+        let places = &mut self.motion.places;
+        // What is left of the forces at the present places.
+        let pulled = pulls.iter().zip(places.iter());
+        let mut forces: Vec<[f64; 3]> = pulled
+            .map(|(pull, &place)| times(&pull.strength, difference(pull.to, place)))
             .collect();
-        let mut diagonal: Vec<[f64; 3]> = pulls
-            .iter()
-            .map(|pull| [0, 1, 2].map(|k| pull.strength[k][k]))
-            .collect();
-        for (&tie, &weight) in self.ties.iter().zip(&self.weights) {
-            let turned = scaled(self.turned(tie), stiffness * weight);
-            let [i, j] = tie.map(|node| node as usize);
-            wanted[i] = add(wanted[i], turned);
-            wanted[j] = difference(wanted[j], turned);
+        let mut blocks: Vec<Matrix> = pulls.iter().map(|pull| pull.strength).collect();
+        let turns = &self.motion.rotations;
+        for (tie, weight) in self.ties.iter().zip(&self.weights) {
+            let (i, j) = (tie.ends[0] as usize, tie.ends[1] as usize);
+            let stretch = difference(difference(places[i], places[j]), tie.turned(turns));
+            let force = scaled(stretch, stiffness * weight);
+            forces[i] = difference(forces[i], force);
+            forces[j] = add(forces[j], force);
             for node in [i, j] {
-                diagonal[node] = diagonal[node].map(|part| part + stiffness * weight);
+                for (k, row) in blocks[node].iter_mut().enumerate() {
+                    row[k] += stiffness * weight;
+                }
             }
         }
-        // From where the nodes are: they move little from one round to the next, so the start is good.
-        let mut places = std::mem::take(&mut self.motion.places);
-        let apply = |z: &[f64], forces: &mut [f64]| {
-            let (z, _) = z.as_chunks::<3>();
-            let (forces, _) = forces.as_chunks_mut::<3>();
-            self.forces(pulls, stiffness, z, forces);
+        let system = System {
+            factors: blocks.iter().map(InverseFactor::of).collect(),
+            neighbours: &self.neighbours,
+            couplings: self
+                .weights
+                .iter()
+                .map(|weight| stiffness * weight)
+                .collect(),
         };
-        // Divided by the diagonal: pulls differ by orders of magnitude between the nodes that have a
-        // counterpart and those that have none.
-        conjugate_gradient(
-            apply,
-            wanted.as_flattened(),
-            Some(diagonal.as_flattened()),
-            places.as_flattened_mut(),
-            UNTIL,
-        );
-        self.motion.places = places;
-    }
-
-    /// The matrix of the normal equations times `z`, tie by tie: it is never stored.
-    fn forces(&self, pulls: &[Pull], stiffness: f64, z: &[[f64; 3]], forces: &mut [[f64; 3]]) {
-        for ((force, pull), z) in forces.iter_mut().zip(pulls).zip(z) {
-            *force = times(&pull.strength, *z);
-        }
-        for (&[i, j], &weight) in self.ties.iter().zip(&self.weights) {
-            let (i, j) = (i as usize, j as usize);
-            let force = scaled(difference(z[i], z[j]), stiffness * weight);
-            forces[i] = add(forces[i], force);
-            forces[j] = difference(forces[j], force);
+        for (place, change) in places.iter_mut().zip(system.solve(&forces)) {
+            *place = add(*place, change);
         }
     }
 }
@@ -206,7 +206,7 @@ mod tests {
             places: places.to_vec(),
             rotations: vec![IDENTITY; places.len()],
         };
-        ElasticNodes::new(places.to_vec(), ties.to_vec(), motion)
+        ElasticNodes::new(places, ties, motion)
     }
 
     #[test]

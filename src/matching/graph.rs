@@ -24,7 +24,7 @@ const LEAST_AGREEMENT: f64 = -0.2;
 pub(super) struct Graph {
     /// Where the links of each point begin; one more than points.
     starts: Vec<usize>,
-    links: Vec<(u32, f64)>,
+    links: Vec<(u32, f32)>,
 }
 
 impl Graph {
@@ -36,25 +36,30 @@ impl Graph {
     ) -> Self {
         let count = NonZeroUsize::new(LINKS + 1).expect("one more than a count");
         let neighbours = search.nearest_of_each(points, count);
-        let mut both = Vec::with_capacity(2 * LINKS * points.len());
+        let mut links = Vec::with_capacity(LINKS * points.len());
         for (from, found) in (0..).zip(&neighbours) {
             let others = found.iter().filter(|neighbour| neighbour.index != from);
             for to in others {
                 let normals = (normals[from as usize], normals[to.index as usize]);
                 if dot(normals.0, normals.1) >= LEAST_AGREEMENT {
-                    let length = to.squared_distance.sqrt();
-                    both.push((from, to.index, length));
-                    both.push((to.index, from, length));
+                    links.push((from, to.index, to.squared_distance.sqrt() as f32));
                 }
             }
         }
+        Self::of_links(points.len(), &links)
+    }
+
+    /// So many points, joined by links `(from, to, length)` that may be passed in both directions.
+    pub(super) fn of_links(points: usize, links: &[(u32, u32, f32)]) -> Self {
+        let both = |&(from, to, length): &(u32, u32, f32)| [(from, to, length), (to, from, length)];
+        let mut both: Vec<(u32, u32, f32)> = links.iter().flat_map(both).collect();
         both.sort_unstable_by_key(|&(from, to, _)| (from, to));
         both.dedup_by_key(|&mut (from, to, _)| (from, to));
-        let mut starts = vec![0; points.len() + 1];
+        let mut starts = vec![0; points + 1];
         for &(from, ..) in &both {
             starts[from as usize + 1] += 1;
         }
-        for k in 0..points.len() {
+        for k in 0..points {
             starts[k + 1] += starts[k];
         }
         let links = both.into_iter().map(|(_, to, length)| (to, length));
@@ -64,48 +69,75 @@ impl Graph {
         }
     }
 
+    /// How many points.
+    pub(super) fn points(&self) -> usize {
+        self.starts.len() - 1
+    }
+
+    /// What one search after the other needs.
+    pub(super) fn paths(&self) -> Paths<'_> {
+        Paths {
+            graph: self,
+            best: vec![f32::INFINITY; self.starts.len() - 1],
+            touched: Vec::new(),
+            queue: BinaryHeap::new(),
+        }
+    }
+}
+
+/// Shortest paths in a graph, one search after the other in the same memory.
+pub(super) struct Paths<'a> {
+    graph: &'a Graph,
+    /// The shortest way known to each point; infinite between searches.
+    best: Vec<f32>,
+    /// Where it is finite.
+    touched: Vec<u32>,
+    queue: BinaryHeap<Reverse<u64>>,
+}
+
+impl Paths<'_> {
     /// Every point whose distance from `from` is below `limit`, with it, nearest first.
-    pub(super) fn within(&self, from: u32, limit: f64) -> Vec<(u32, f64)> {
-        let mut best = rustc_hash::FxHashMap::default();
-        let mut queue = BinaryHeap::new();
+    pub(super) fn within(&mut self, from: u32, limit: f32) -> Vec<(u32, f32)> {
         let mut reached = Vec::new();
-        best.insert(from, 0.0);
-        queue.push(Reverse(Reached(0.0, from)));
-        while let Some(Reverse(Reached(distance, point))) = queue.pop() {
-            if distance > best[&point] {
+        self.reach(from, 0.0);
+        while let Some(Reverse(key)) = self.queue.pop() {
+            let (distance, point) = unpacked(key);
+            if distance > self.best[point as usize] {
                 continue;
             }
             reached.push((point, distance));
-            for &(to, length) in
-                &self.links[self.starts[point as usize]..self.starts[point as usize + 1]]
-            {
+            let graph = self.graph;
+            let links = graph.starts[point as usize]..graph.starts[point as usize + 1];
+            for &(to, length) in &graph.links[links] {
                 let through = distance + length;
-                if through < limit && best.get(&to).is_none_or(|&known| through < known) {
-                    best.insert(to, through);
-                    queue.push(Reverse(Reached(through, to)));
+                if through < limit && through < self.best[to as usize] {
+                    self.reach(to, through);
                 }
             }
         }
+        for point in self.touched.drain(..) {
+            self.best[point as usize] = f32::INFINITY;
+        }
         reached
     }
-}
 
-/// A distance and where it leads, in the order of distances, then of points.
-#[derive(Clone, Copy, PartialEq)]
-struct Reached(f64, u32);
-
-impl Eq for Reached {}
-
-impl Ord for Reached {
-    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
-        self.0.total_cmp(&other.0).then(self.1.cmp(&other.1))
+    fn reach(&mut self, point: u32, distance: f32) {
+        if self.best[point as usize] == f32::INFINITY {
+            self.touched.push(point);
+        }
+        self.best[point as usize] = distance;
+        self.queue.push(Reverse(packed(distance, point)));
     }
 }
 
-impl PartialOrd for Reached {
-    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
-        Some(self.cmp(other))
-    }
+/// A distance and where it leads as one number, in the order of distances, then of points: the bits
+/// of floating-point numbers that are not negative have the order of the numbers.
+fn packed(distance: f32, point: u32) -> u64 {
+    u64::from(distance.to_bits()) << 32 | u64::from(point)
+}
+
+fn unpacked(key: u64) -> (f32, u32) {
+    (f32::from_bits((key >> 32) as u32), key as u32)
 }
 
 #[cfg(test)]
@@ -129,7 +161,7 @@ mod tests {
             normals.push([0.0, 0.0, -1.0]);
         }
         let graph = Graph::of_surface(&points, &normals, &NeighbourSearch::new(&points));
-        let reached = graph.within(0, 10.0);
+        let reached = graph.paths().within(0, 10.0);
         assert_eq!(reached.len(), points.len());
         let &(_, far) = reached
             .iter()
@@ -137,7 +169,7 @@ mod tests {
             .expect("reached");
         // 0.01 apart in space; 1.99 to 2.01 along the strip, whose corner a link may cut.
         assert!((1.97..2.02).contains(&far), "{far}");
-        let near = graph.within(0, 0.035);
+        let near = graph.paths().within(0, 0.035);
         let near: Vec<u32> = near.into_iter().map(|(point, _)| point).collect();
         assert_eq!(near, [0, 1, 2, 3]);
     }

@@ -16,7 +16,8 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::surface::{NodeMotion, Surface};
+use super::level::NodeMotion;
+use super::surface::Surface;
 use crate::geometry::linear::{difference, dot, length};
 use crate::shape::{NeighbourSearch, Normalisation, Shape};
 
@@ -74,7 +75,9 @@ impl Sites {
     /// Places and normals of the sites after a motion of their surface.
     fn carried(&self, surface: &Surface, motion: &NodeMotion) -> Vec<([f64; 3], [f64; 3])> {
         let site = |(&place, &anchor): (&[f64; 3], &u32)| {
-            surface.carry(motion, anchor, (place, surface.normals[anchor as usize]))
+            surface
+                .finest()
+                .carry(motion, anchor, (place, surface.normals[anchor as usize]))
         };
         self.places
             .par_iter()
@@ -153,7 +156,7 @@ pub(super) fn there_and_back(this: Laid<'_>, other: Laid<'_>) -> Vec<f64> {
 /// The mean over the nodes of both surfaces of how far each comes back from itself.
 pub(super) fn disagreement(this: Laid<'_>, other: Laid<'_>) -> f64 {
     let ways = [(this, other), (other, this)].map(|(this, other)| {
-        let nodes = &this.surface.nodes;
+        let nodes = &this.surface.finest().nodes;
         let distances = nodes.iter().map(|&node| round_trip(this, other, node));
         distances.sum::<f64>() / nodes.len() as f64
     });
@@ -165,9 +168,15 @@ fn round_trip(this: Laid<'_>, other: Laid<'_>, point: u32) -> f64 {
         this.surface.points[point as usize],
         this.surface.normals[point as usize],
     );
-    let (place, normal) = this.surface.carry(this.motion, point, (start, normal));
+    let (place, normal) = this
+        .surface
+        .finest()
+        .carry(this.motion, point, (start, normal));
     let anchor = other.surface.nearest_facing(place, normal);
-    let (end, _) = other.surface.carry(other.motion, anchor, (place, normal));
+    let (end, _) = other
+        .surface
+        .finest()
+        .carry(other.motion, anchor, (place, normal));
     length(difference(end, start))
 }
 

@@ -1,15 +1,17 @@
 //! The motion that lays one surface onto another: assignment and deformation in turn, first far and
-//! stiff, then near and yielding.
+//! stiff with few nodes, then near and yielding with all.
 
 use std::num::NonZeroUsize;
 
 use rayon::prelude::*;
 
-use super::assignment::{Likeness, Marks, pulls, sliding};
+use super::affinity::{Likeness, Marks};
+use super::assignment::{pulls, sliding};
 use super::elastic::{ElasticNodes, Pull, Stiffness};
+use super::level::{Level, NodeMotion};
 use super::rotation::RigidMotion;
-use super::surface::{NodeMotion, Surface};
-use crate::geometry::linear::{add, dot, scaled, times};
+use super::surface::Surface;
+use crate::geometry::linear::{add, difference, dot, scaled, times};
 
 /// Standard deviations of distances that registration begins with, in normalised units. A wide one
 /// carries limbs far, a narrow one keeps what has hardly moved from being drawn away: each succeeds
@@ -44,8 +46,13 @@ const REMOTENESS_UNTIL: f64 = 0.5;
 const SLACK: f64 = 0.05;
 
 /// Steps towards the planes of all points of the target, in the end, and their standard deviation.
-const FINE_STEPS: usize = 15;
+const FINE_STEPS: usize = 25;
 const FINE_SIGMA: f64 = 0.01;
+
+/// Standard deviation of how far the way back misses a node, in the fine steps, and the most that
+/// it counts, as an exponent: where both ways disagree altogether, both go to the nearest planes.
+const RETURN_SIGMA: f64 = 0.035;
+const MOST_RETURN: f64 = 4.0;
 
 /// Rounds of rotations and places at each step.
 const ROUNDS: usize = 3;
@@ -53,34 +60,99 @@ const ROUNDS: usize = 3;
 /// Points of the target that pull at a node in the fine steps.
 const PULLING: NonZeroUsize = NonZeroUsize::new(16).expect("16 is not 0");
 
-/// Lays `source` onto `target`, from where `start` takes it, beginning with assignments of standard
-/// deviation `width`.
-pub(super) fn register(
-    source: &Surface,
-    target: &Surface,
-    start: &RigidMotion,
+/// A level serves while the standard deviation is at least this many of its spacings: finer nodes
+/// would change sums over so many of them little.
+const COARSE: f64 = 1.2;
+
+/// One surface on its way onto another.
+pub(super) struct Registration<'a> {
+    source: &'a Surface,
+    target: &'a Surface,
     width: f64,
-) -> NodeMotion {
-    let rest = source.node_points();
-    let motion = NodeMotion {
-        places: rest.iter().map(|&x| start.apply(x)).collect(),
-        rotations: vec![start.rotation; rest.len()],
-    };
-    let mut nodes = ElasticNodes::new(rest, source.ties.clone(), motion);
-    let normals = source.node_normals();
-    for step in 0..STEPS {
-        let stage = Stage::new(width, step);
-        let facing = turned(&nodes.motion, &normals);
-        let pulls = stage.pulls((source, &nodes.motion, &facing), target);
-        nodes.relax(&pulls, stage.resistance(source), ROUNDS);
+    step: usize,
+    /// How many of the source's levels are finer than that of the nodes.
+    level: usize,
+    nodes: ElasticNodes,
+}
+
+impl<'a> Registration<'a> {
+    /// Steps before those of [`Self::settle`].
+    pub(super) const STEPS: usize = STEPS;
+
+    /// Steps of [`Self::settle`].
+    pub(super) const FINE_STEPS: usize = FINE_STEPS;
+
+    /// Will lay the first surface onto the second, from where `start` takes it, beginning with
+    /// assignments of standard deviation `width`.
+    pub(super) fn new([source, target]: [&'a Surface; 2], start: &RigidMotion, width: f64) -> Self {
+        let level = source.levels.len().min(target.levels.len()) - 1;
+        let rest = &source.levels[level].places;
+        let motion = NodeMotion {
+            places: rest.iter().map(|&x| start.apply(x)).collect(),
+            rotations: vec![start.rotation; rest.len()],
+        };
+        Self {
+            source,
+            target,
+            width,
+            step: 0,
+            level,
+            nodes: elastic(&source.levels[level], motion),
+        }
     }
-    let last = Stage::new(width, STEPS - 1);
-    for _ in 0..FINE_STEPS {
-        let facing = turned(&nodes.motion, &normals);
-        let pulls = fine_pulls(target, &nodes.motion.places, &facing);
-        nodes.relax(&pulls, last.resistance(source), ROUNDS);
+
+    /// Makes the next step.
+    pub(super) fn advance(&mut self) {
+        let stage = Stage::new(self.width, self.step);
+        while self.level > 0
+            && stage.likeness.sigma < COARSE * self.source.levels[self.level].spacing()
+        {
+            self.refine();
+        }
+        let level = &self.source.levels[self.level];
+        let motion = &self.nodes.motion;
+        let facing = turned(motion, &level.normals);
+        let pulls = stage.pulls((self.source, motion, &facing), self.target, self.level);
+        self.nodes.relax(&pulls, stage.resistance(level), ROUNDS);
+        self.step += 1;
     }
-    nodes.motion
+
+    /// Makes a step towards the planes of all points of the target, which `back` lays onto the source.
+    pub(super) fn settle(&mut self, back: &NodeMotion) {
+        while self.level > 0 {
+            self.refine();
+        }
+        let stage = Stage::new(self.width, STEPS - 1);
+        let level = self.source.finest();
+        let pulls = fine_pulls((level, &self.nodes.motion), (self.target, back));
+        self.nodes.relax(&pulls, stage.resistance(level), ROUNDS);
+    }
+
+    /// Goes on with the next finer nodes, which those of now carry.
+    fn refine(&mut self) {
+        let motion = self.finer(self.level, &self.nodes.motion);
+        self.level -= 1;
+        self.nodes = elastic(&self.source.levels[self.level], motion);
+    }
+
+    /// The motion of the nodes that those of a level carry.
+    fn finer(&self, level: usize, motion: &NodeMotion) -> NodeMotion {
+        let [level, finer] = [level, level - 1].map(|k| &self.source.levels[k]);
+        level.carried(motion, &finer.places)
+    }
+
+    /// Where the finest nodes are.
+    pub(super) fn motion(&self) -> NodeMotion {
+        let levels = (1..=self.level).rev();
+        levels.fold(self.nodes.motion.clone(), |motion, level| {
+            self.finer(level, &motion)
+        })
+    }
+}
+
+/// Nodes of a level that have been moved.
+fn elastic(level: &Level, motion: NodeMotion) -> ElasticNodes {
+    ElasticNodes::new(&level.places, &level.ties, motion)
 }
 
 /// One step on the way from far and stiff to near and yielding.
@@ -113,6 +185,7 @@ impl Stage {
         &self,
         (source, motion, facing): (&Surface, &NodeMotion, &[[f64; 3]]),
         target: &Surface,
+        level: usize,
     ) -> Vec<Pull> {
         let ours = Marks {
             points: &motion.places,
@@ -120,16 +193,22 @@ impl Stage {
             remoteness: &source.remoteness,
         };
         let theirs = Marks {
-            points: &target.node_points(),
-            normals: &target.node_normals(),
+            points: &target.levels[level].places,
+            normals: &target.levels[level].normals,
             remoteness: &target.remoteness,
         };
-        pulls(&ours, &theirs, &self.likeness, self.slide)
+        // Scalings of n nodes are about 1 / sqrt(n K): what stays unassigned is the same with fewer.
+        let share = ours.points.len() as f64 / source.finest().places.len() as f64;
+        let likeness = Likeness {
+            slack: self.likeness.slack * share.sqrt(),
+            ..self.likeness
+        };
+        pulls(&ours, &theirs, &likeness, self.slide)
     }
 
-    fn resistance(&self, source: &Surface) -> Stiffness {
+    fn resistance(&self, level: &Level) -> Stiffness {
         Stiffness {
-            stiffness: STIFFNESS / (source.spacing() * source.spacing()),
+            stiffness: STIFFNESS / (level.spacing() * level.spacing()),
             give: self.give,
         }
     }
@@ -141,20 +220,30 @@ fn turned(motion: &NodeMotion, normals: &[[f64; 3]]) -> Vec<[f64; 3]> {
     turns.map(|(turn, normal)| times(turn, *normal)).collect()
 }
 
-/// Pulls onto the planes of the target's points next to each node.
-fn fine_pulls(target: &Surface, places: &[[f64; 3]], normals: &[[f64; 3]]) -> Vec<Pull> {
+/// Pulls onto the planes of the target's points next to each node, of which those count most that
+/// the way back takes near to where the node comes from.
+fn fine_pulls(
+    (level, motion): (&Level, &NodeMotion),
+    (target, back): (&Surface, &NodeMotion),
+) -> Vec<Pull> {
     let sigma = FINE_SIGMA;
-    let pull = |(&place, &normal): (&[f64; 3], &[f64; 3])| {
+    let normals = turned(motion, &level.normals);
+    let pull = |k: usize| {
+        let (place, normal, rest) = (motion.places[k], normals[k], level.places[k]);
         let (mut sum, mut to, mut facing) = (0.0, [0.0; 3], [0.0; 3]);
         for near in target.search.nearest(place, PULLING) {
             let k = near.index as usize;
-            let agreement = dot(normal, target.normals[k]);
-            let exponent =
-                near.squared_distance / (2.0 * sigma * sigma) + NORMALS * (1.0 - agreement);
+            let (y, theirs) = (target.points[k], target.normals[k]);
+            let returned = target.finest().carry(back, near.index, (y, theirs)).0;
+            let missed = difference(returned, rest);
+            let missed = dot(missed, missed) / (2.0 * RETURN_SIGMA * RETURN_SIGMA);
+            let exponent = near.squared_distance / (2.0 * sigma * sigma)
+                + NORMALS * (1.0 - dot(normal, theirs))
+                + missed.min(MOST_RETURN);
             let share = (-exponent).exp();
             sum += share;
-            to = add(to, scaled(target.points[k], share));
-            facing = add(facing, scaled(target.normals[k], share));
+            to = add(to, scaled(y, share));
+            facing = add(facing, scaled(theirs, share));
         }
         let to = if sum > 0.0 {
             scaled(to, sum.recip())
@@ -167,5 +256,5 @@ fn fine_pulls(target: &Surface, places: &[[f64; 3]], normals: &[[f64; 3]]) -> Ve
             strength: sliding(strength, facing, SLIDE[1]),
         }
     };
-    places.par_iter().zip(normals).map(pull).collect()
+    (0..level.places.len()).into_par_iter().map(pull).collect()
 }

@@ -4,7 +4,7 @@
 //! lay principal axes onto principal axes, each about the centroids; each but the first is improved
 //! by iterated closest points with a fifth of the pairs left out (Chetverikov, Stepanov and Krsek,
 //! "Robust Euclidean alignment of 3D point sets: the trimmed iterative closest point algorithm",
-//! Image and Vision Computing 23, 2005). Mirrored candidates there are none. Scans mostly come in
+//! Image and Vision Computing 23, 2005), fewer and fewer of them. Mirrored candidates there are none. Scans mostly come in
 //! one frame and animals look alike from several sides, so that no motion is kept unless another
 //! comes clearly closer.
 
@@ -20,8 +20,9 @@ use crate::geometry::linear::{
 /// Nodes of each surface that take part.
 const NODES: usize = 400;
 
-/// Rounds of closest points.
-const ROUNDS: usize = 25;
+/// Rounds of closest points, each with how many of the candidates go on to it: the closest after the
+/// rounds before, and always that which begins with no motion.
+const ROUNDS: [(usize, usize); 3] = [(6, usize::MAX), (9, 8), (10, 3)];
 
 /// The share of the pairs that counts: the rest may belong to what moved or is missing.
 const KEPT: f64 = 0.8;
@@ -46,14 +47,7 @@ pub(super) struct Alignment {
 pub(super) fn align(source: &Surface, target: &Surface) -> Alignment {
     let sides = Sides::new(source, target);
     let unmoved = sides.distance(&RigidMotion::IDENTITY);
-    let tried: Vec<(RigidMotion, f64)> = sides
-        .candidates()
-        .par_iter()
-        .map(|start| {
-            let motion = sides.improved(*start);
-            (motion, sides.distance(&motion))
-        })
-        .collect();
+    let tried = sides.improved(sides.candidates());
     let mut best = (RigidMotion::IDENTITY, unmoved, CLEARLY);
     for (motion, distance) in tried {
         if distance < best.2 * best.1 {
@@ -87,7 +81,12 @@ impl<'a> Sides<'a> {
     fn new(source: &'a Surface, target: &'a Surface) -> Self {
         let surfaces = [source, target];
         let probes = surfaces.map(|surface| {
-            let nodes = surface.nodes.iter().take(NODES).map(|&node| node as usize);
+            let nodes = surface
+                .finest()
+                .nodes
+                .iter()
+                .take(NODES)
+                .map(|&node| node as usize);
             nodes
                 .map(|node| (surface.points[node], surface.normals[node]))
                 .collect()
@@ -121,18 +120,35 @@ impl<'a> Sides<'a> {
         (means[0] + means[1]) / 2.0
     }
 
-    /// The motion after rounds of closest pairs in both directions.
-    fn improved(&self, mut motion: RigidMotion) -> RigidMotion {
-        for _ in 0..ROUNDS {
-            let forth = self
-                .closest(0, &motion)
-                .into_iter()
-                .map(|(x, near, _)| (x, near));
-            let back = self.closest(1, &motion.inverse()).into_iter();
-            let back = back.map(|(y, near, _)| (near, y));
-            motion = RigidMotion::between(&forth.chain(back).collect::<Vec<_>>());
+    /// The candidates that go on to the end, improved, and how close they come, in their order.
+    fn improved(&self, candidates: Vec<RigidMotion>) -> Vec<(RigidMotion, f64)> {
+        let mut tried: Vec<(RigidMotion, f64)> = candidates
+            .into_iter()
+            .map(|motion| (motion, f64::NAN))
+            .collect();
+        for (rounds, count) in ROUNDS {
+            let mut order: Vec<usize> = (1..tried.len()).collect();
+            order.sort_by(|&a, &b| tried[a].1.total_cmp(&tried[b].1));
+            order.truncate(count);
+            order.sort_unstable();
+            let going_on = std::iter::once(0).chain(order).map(|k| tried[k].0);
+            let going_on: Vec<RigidMotion> = going_on.collect();
+            let after = |&start: &RigidMotion| {
+                let motion = (0..rounds).fold(start, |motion, _| self.closer(&motion));
+                (motion, self.distance(&motion))
+            };
+            tried = going_on.par_iter().map(after).collect();
         }
-        motion
+        tried
+    }
+
+    /// The motion after a round of closest pairs in both directions.
+    fn closer(&self, motion: &RigidMotion) -> RigidMotion {
+        let forth = self.closest(0, motion).into_iter();
+        let forth = forth.map(|(x, near, _)| (x, near));
+        let back = self.closest(1, &motion.inverse()).into_iter();
+        let back = back.map(|(y, near, _)| (near, y));
+        RigidMotion::between(&forth.chain(back).collect::<Vec<_>>())
     }
 
     /// The identity first, the cube's rotations, the principal axes'.

@@ -6,7 +6,8 @@
 //! 1987): always proper, also where `C` is flat or mirrored.
 
 use crate::geometry::linear::{
-    IDENTITY, Matrix, add, add_outer, difference, mean, symmetric_eigen, times, transposed,
+    IDENTITY, Matrix, add, add_outer, cross, difference, dot, mean, scaled, symmetric_eigen, times,
+    transposed,
 };
 
 /// `x -> rotation x + translation`.
@@ -77,6 +78,52 @@ impl RigidMotion {
 
 /// The proper rotation `R` with the greatest `trace(R^T C)`.
 pub(super) fn nearest_rotation(c: &Matrix) -> Matrix {
+    polar_rotation(c).unwrap_or_else(|| turned_by_quaternion(c))
+}
+
+/// Steps of the polar decomposition; a matrix that [`LEAST_VOLUME`] admits takes up to eight.
+const POLAR_STEPS: usize = 12;
+
+/// The polar decomposition is left to matrices whose determinant is at least this share of the cube
+/// of their size.
+const LEAST_VOLUME: f64 = 1e-9;
+
+/// The rotation of the polar decomposition of a matrix with a positive determinant; none of others.
+///
+/// `X -> (g X + X^-T / g) / 2` with `g^2 = |X^-1| / |X|` doubles the right digits with each step
+/// (Higham, "Computing the polar decomposition - with applications", SIAM J. Sci. Stat. Comput. 7,
+/// 1986).
+fn polar_rotation(c: &Matrix) -> Option<Matrix> {
+    let mut x = *c;
+    let size = |m: &Matrix| (dot(m[0], m[0]) + dot(m[1], m[1]) + dot(m[2], m[2])).sqrt();
+    for step in 0..POLAR_STEPS {
+        let cofactors = [cross(x[1], x[2]), cross(x[2], x[0]), cross(x[0], x[1])];
+        let volume = dot(x[0], cofactors[0]);
+        let (own, inverse) = (size(&x), size(&cofactors));
+        if step == 0 && (volume.is_nan() || volume <= LEAST_VOLUME * own * own * own) {
+            return None;
+        }
+        // X^-T is the matrix of the cofactors over the determinant.
+        let factor = (inverse / (volume * own)).sqrt();
+        let (mine, theirs) = (0.5 * factor, 0.5 / (factor * volume));
+        let mixed = |row: usize| add(scaled(x[row], mine), scaled(cofactors[row], theirs));
+        let next = [mixed(0), mixed(1), mixed(2)];
+        let apart = |row: usize| difference(next[row], x[row]);
+        let change = [apart(0), apart(1), apart(2)];
+        x = next;
+        if size(&change) < CLOSE {
+            return Some(x);
+        }
+    }
+    None
+}
+
+/// The last step of the polar decomposition changes nothing beyond this; its square is below
+/// rounding.
+const CLOSE: f64 = 1e-8;
+
+/// The rotation of the unit quaternion that Horn's matrix has.
+fn turned_by_quaternion(c: &Matrix) -> Matrix {
     // Horn's matrix for S_ab = sum x_a y_b, which is the transpose of C = sum y x^T.
     let s = transposed(c);
     let [[xx, xy, xz], [yx, yy, yz], [zx, zy, zz]] = s;
@@ -173,5 +220,24 @@ pub(super) mod tests {
         // Of the mirror along the axis that weighs least nothing is left but the identity.
         assert!(farthest(&nearest_rotation(&mirror), &IDENTITY) < 1e-14);
         assert!(farthest(&nearest_rotation(&flat), &IDENTITY) < 1e-14);
+    }
+
+    #[test]
+    fn both_ways_to_the_nearest_rotation_agree() {
+        // Stretched by a factor of a thousand, and nearly mirrored.
+        for stretch in [[1.0, 1.0, 1.0], [3.0, 0.5, 0.003], [1e-4, 2e-4, 5e-5]] {
+            let scale = [0, 1, 2].map(|k| scaled(IDENTITY[k], stretch[k]));
+            for angle in [0.0, 0.3, 1.5, 3.0] {
+                let c = product(&turn(angle), &product(&turn(0.7), &scale));
+                let polar = polar_rotation(&c).expect("a positive determinant");
+                // Rounding of the matrix moves the rotation by its size over its least stretch.
+                assert!(farthest(&polar, &turned_by_quaternion(&c)) < 1e-12);
+                assert!(farthest(&polar, &product(&turn(angle), &turn(0.7))) < 1e-12);
+            }
+        }
+        assert_eq!(polar_rotation(&[[0.0; 3]; 3]), None);
+        assert_eq!(polar_rotation(&[[f64::NAN; 3]; 3]), None);
+        let mirror = [[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        assert_eq!(polar_rotation(&mirror), None);
     }
 }

@@ -83,6 +83,11 @@ fn odd_body(count: usize, seed: u64) -> Vec<(Point, Point)> {
     (0..count).map(&mut point).collect()
 }
 
+/// The pairs of two shapes, whose progress nobody follows.
+fn found(source: &Shape, target: &Shape, options: &MatchOptions) -> Result<Matching, MatchError> {
+    match_shapes(source, target, options, &mut |_, _, _| {})
+}
+
 fn small() -> MatchOptions {
     MatchOptions {
         nodes: 500,
@@ -120,7 +125,7 @@ fn a_rigid_motion_is_recovered_and_every_point_found() {
     // Another order: vertex k of the source is vertex 1999 - k of the target.
     target.mesh.vertices.reverse();
     target.mesh.normals.as_mut().expect("normals").reverse();
-    let found = match_shapes(&source, &target, &small()).expect("matched");
+    let found = found(&source, &target, &small()).expect("matched");
     // Points are float32 once normalised, which near 3 is 2e-7.
     for (found, given) in found
         .rigid
@@ -170,7 +175,7 @@ fn the_bend_of_a_bar_is_recovered() {
         aligned: true,
         ..small()
     };
-    let found = match_shapes(&source, &target, &options).expect("matched");
+    let found = found(&source, &target, &options).expect("matched");
     let errors = errors(
         &found,
         |vertex| bent(first[vertex as usize].0, angle),
@@ -238,7 +243,7 @@ fn two_near_parallel_prongs_that_move_apart_are_not_confused() {
             aligned: true,
             ..small()
         };
-        let found = match_shapes(&source, &target, &options).expect("matched");
+        let found = found(&source, &target, &options).expect("matched");
         let prongs = found.pairs.iter().filter_map(|pair| {
             let from = first[pair.source as usize].1?;
             Some((from, second[pair.target as usize].1?))
@@ -264,7 +269,7 @@ fn what_is_missing_in_the_target_stays_unmatched() {
     assert!(second.len() < 3800, "something is cut away");
     let source = cloud(&first, |x| x);
     let target = cloud(&second, |x| x);
-    let found = match_shapes(&source, &target, &small()).expect("matched");
+    let found = found(&source, &target, &small()).expect("matched");
     // The spacing is .02: what lies 3 of it inside the hole has no counterpart.
     let wrong = found
         .pairs
@@ -297,28 +302,24 @@ fn the_same_shapes_give_the_same_pairs_on_any_number_of_cores() {
         points: 1000,
         ..small()
     };
-    let everywhere = match_shapes(&source, &target, &options)
-        .expect("matched")
-        .pairs;
+    let everywhere = found(&source, &target, &options).expect("matched").pairs;
     let one = rayon::ThreadPoolBuilder::new()
         .num_threads(1)
         .build()
         .expect("a pool");
     let alone = one
-        .install(|| match_shapes(&source, &target, &options))
+        .install(|| found(&source, &target, &options))
         .expect("matched")
         .pairs;
     assert_eq!(everywhere, alone);
     let other = MatchOptions { seed: 5, ..options };
-    let other = match_shapes(&source, &target, &other)
-        .expect("matched")
-        .pairs;
+    let other = found(&source, &target, &other).expect("matched").pairs;
     assert_ne!(everywhere, other, "another thousand points are drawn");
     let few = MatchOptions {
         count: Some(40),
         ..options
     };
-    let few = match_shapes(&source, &target, &few).expect("matched");
+    let few = found(&source, &target, &few).expect("matched");
     assert_eq!(few.pairs.len(), 40);
     assert!(few.pairs.iter().all(|pair| everywhere.contains(pair)));
     // Forty discs of radius .05 would cover .3 of the area if none overlapped; drawn at random they
@@ -333,7 +334,7 @@ fn pairs_are_read_back_as_they_were_written() {
         nodes: 150,
         ..small()
     };
-    let found = match_shapes(&shape, &shape, &options).expect("matched");
+    let found = found(&shape, &shape, &options).expect("matched");
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("pairs.csv");
     found.write_csv(&path).expect("written");
@@ -350,7 +351,7 @@ fn options_out_of_range_and_shapes_without_a_sure_pair_are_refused() {
     let shape = cloud(&odd_body(300, 2), |x| x);
     let message = |options: MatchOptions| {
         let other = cloud(&odd_body(300, 3), |x| [x[0], 2.0 * x[1], 0.3 * x[2]]);
-        match_shapes(&shape, &other, &options)
+        found(&shape, &other, &options)
             .expect_err("refused")
             .to_string()
     };
@@ -385,4 +386,24 @@ fn options_out_of_range_and_shapes_without_a_sure_pair_are_refused() {
         text.starts_with("body.ply and body.ply: no pair") && text.contains("least confidence"),
         "{text}"
     );
+}
+
+#[test]
+fn stages_are_reported_in_order_each_from_nothing_to_all() {
+    let shape = cloud(&odd_body(300, 2), |x| x);
+    let options = MatchOptions {
+        nodes: 100,
+        ..small()
+    };
+    let mut reports = Vec::new();
+    let mut report = |stage, done, total| reports.push((stage, done, total));
+    match_shapes(&shape, &shape, &options, &mut report).expect("matched");
+    let stages: Vec<MatchStage> = reports.iter().map(|report| report.0).collect();
+    assert!(stages.is_sorted_by_key(|&stage| stage as u8));
+    for stages in reports.chunk_by(|a, b| a.0 == b.0) {
+        let (stage, _, total) = stages[0];
+        let done = stages.iter().map(|report| report.1);
+        assert!(done.eq(0..=total), "{stage}: {stages:?}");
+    }
+    assert_eq!(reports.last(), Some(&(MatchStage::Pairs, 1, 1)));
 }

@@ -5,17 +5,24 @@ use std::path::Path;
 use crate::atomic::write_atomically;
 use crate::charts::{ChartError, Line, Panel, line_chart};
 use crate::error::{Error, Result};
+use crate::event::Event;
 use crate::formats::Shape;
 use crate::matching::{MatchOptions, Matching, match_shapes};
 
 /// Finds which vertices of two shapes correspond: two poses or states of one thing, as meshes or point
 /// clouds, complete or with parts missing. The same shapes and options give the same pairs, whatever the
-/// number of cores.
+/// number of cores. `on_event` is called with [`Event::Matching`] while the work goes on.
 ///
 /// # Errors
 /// An option out of range; a shape without area; no pair that is sure enough.
-pub fn find(source: &Shape, target: &Shape, options: &MatchOptions) -> Result<Matching> {
-    Ok(match_shapes(source, target, options)?)
+pub fn find(
+    source: &Shape,
+    target: &Shape,
+    options: &MatchOptions,
+    mut on_event: impl FnMut(&Event),
+) -> Result<Matching> {
+    let mut report = |stage, done, total| on_event(&Event::Matching { stage, done, total });
+    Ok(match_shapes(source, target, options, &mut report)?)
 }
 
 impl Matching {

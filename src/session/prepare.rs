@@ -72,13 +72,14 @@ fn matched(
     if let Some(path) = stored.filter(|path| path.is_file()) {
         return Ok((Correspondences::read_csv(path, source, target)?, None));
     }
-    emit(&Event::Matching);
     let options = MatchOptions {
         points: recipe.data.points,
         seed: recipe.training.seed,
         ..MatchOptions::default()
     };
-    let found = match_shapes(source, target, &options)?;
+    let found = match_shapes(source, target, &options, &mut |stage, done, total| {
+        emit(&Event::Matching { stage, done, total });
+    })?;
     Ok((found.correspondences(), Some(found)))
 }
 

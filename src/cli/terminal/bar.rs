@@ -12,7 +12,7 @@ use std::time::Instant;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use isomorph::Event;
-use isomorph::event::duration;
+use isomorph::event::{MatchStage, duration};
 
 use super::pace::Pace;
 use super::told;
@@ -32,7 +32,7 @@ impl Screen for Stderr {
     }
 }
 
-/// Draws one bar at a time, of training, extraction or measuring, below the lines of its events.
+/// Draws one bar at a time, of matching, training, extraction or measuring, below the lines of its events.
 #[derive(Debug)]
 pub(super) struct Bar<S> {
     screen: S,
@@ -84,6 +84,7 @@ impl<S: Screen> Bar<S> {
                 self.begin(*steps, *first_step);
             }
             Event::PhaseEntered { phase, .. } => self.phase = phase.to_string(),
+            Event::Matching { stage, done, total } => self.find(*stage, *done, *total),
             Event::Extracting { frames } => self.begin(*frames, 0),
             Event::Extracted { .. } => self.extracted(),
             _ => {}
@@ -133,6 +134,19 @@ impl<S: Screen> Bar<S> {
             0 => "finding the best times",
             _ => "measuring",
         });
+        if done >= total {
+            self.clear();
+        }
+    }
+
+    /// Pairs that are found: a bar for each stage, which ends with it.
+    fn find(&mut self, stage: MatchStage, done: usize, total: usize) {
+        if done == 0 || self.bar.is_none() {
+            self.begin(total, done);
+        }
+        let Some(bar) = &self.bar else { return };
+        bar.set_position(done as u64);
+        bar.set_message(format!("finding pairs: {stage}"));
         if done >= total {
             self.clear();
         }

@@ -39,7 +39,21 @@ impl<W: Write> PlainLines<W> {
             }
             self.shown = Some(now);
         }
-        if let Some(text) = told(event, &self.run, self.pace.left()) {
+        let mut text = told(event, &self.run, self.pace.left());
+        match event {
+            // Each stage as it begins, and how far it has come only where it takes long.
+            Event::Matching { done, .. } => {
+                if *done > 0 && self.is_late(now) {
+                    text = Some(event.to_string());
+                }
+                if text.is_some() {
+                    self.shown = Some(now);
+                }
+            }
+            Event::Started { .. } => self.shown = None,
+            _ => {}
+        }
+        if let Some(text) = text {
             // In one write, so that lines of other processes do not get into it. Nobody may be
             // reading any more; that is no reason to stop training.
             let _ = self.out.write_all(format!("{text}\n").as_bytes());
@@ -48,18 +62,20 @@ impl<W: Write> PlainLines<W> {
 
     /// The first and the last step are always due, and one that stops the run.
     fn is_due(&self, report: &StepReport, now: Instant) -> bool {
-        report.step >= report.steps
-            || !report.total.is_finite()
-            || self
-                .shown
-                .is_none_or(|shown| now.duration_since(shown) >= INTERVAL)
+        report.step >= report.steps || !report.total.is_finite() || self.is_late(now)
+    }
+
+    /// Whether no step was shown for a while.
+    fn is_late(&self, now: Instant) -> bool {
+        self.shown
+            .is_none_or(|shown| now.duration_since(shown) >= INTERVAL)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use isomorph::event::{Phase, TermReport};
+    use isomorph::event::{MatchStage, Phase, TermReport};
     use std::path::Path;
 
     fn report(step: usize, total: f64) -> Event {
@@ -107,6 +123,28 @@ mod tests {
         );
         let last_is_early = written(&[(0.0, report(399, 1.0)), (0.1, report(400, 1.0))]);
         assert_eq!(last_is_early.lines().count(), 2, "{last_is_early}");
+    }
+
+    #[test]
+    fn stages_of_matching_are_written_and_their_share_where_they_take_long() {
+        let matching = |stage, done| Event::Matching {
+            stage,
+            done,
+            total: 4,
+        };
+        let text = written(&[
+            (0.0, matching(MatchStage::Surfaces, 0)),
+            (1.0, matching(MatchStage::Surfaces, 4)),
+            (1.0, matching(MatchStage::Registration, 0)),
+            (3.0, matching(MatchStage::Registration, 1)),
+            (7.0, matching(MatchStage::Registration, 2)),
+            (9.0, matching(MatchStage::Registration, 3)),
+        ]);
+        let registration = "finding pairs: registration in both directions";
+        assert_eq!(
+            text,
+            format!("finding pairs: surfaces\n{registration}\n{registration}, 50 %\n")
+        );
     }
 
     #[test]
