@@ -11,7 +11,11 @@ use super::distance::SignedDistance;
 use crate::cubes::{Grid, extract};
 use crate::geometry::{Bounds, Mesh};
 
-/// Cells along the longest side of the box: as fine as the points, within these limits.
+/// The edge of a cell in spacings of the points. Of 20,000 points of the fox, 1 gives the same Chamfer distance
+/// and takes twice as long.
+const CELL: f64 = 1.4;
+
+/// Cells along the longest side of the box, within these limits.
 const CELLS: [f64; 2] = [48.0, 320.0];
 
 /// Margins of the box, as shares of its longest side, tried in turn: an open scan closes beyond its points.
@@ -28,7 +32,7 @@ pub(super) fn reconstruct(points: &[[f32; 3]], normals: &[[f32; 3]]) -> Option<M
     let longest = (0..3).map(|axis| max[axis] - min[axis]).fold(0.0, f32::max);
     MARGINS.into_iter().find_map(|margin| {
         let by = margin * longest;
-        let cells = f64::from(longest + 2.0 * by) / distance.spacing();
+        let cells = f64::from(longest + 2.0 * by) / (CELL * distance.spacing());
         let cells = cells.clamp(CELLS[0], CELLS[1]) as usize;
         let grid = Grid::new(min.map(|x| x - by), max.map(|x| x + by), cells).ok()?;
         let values = |places: &[[f32; 3]]| {

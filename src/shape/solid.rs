@@ -31,18 +31,30 @@ pub(crate) struct SolidParts {
     pub points: Vec<[f32; 3]>,
     /// Its triangles.
     pub triangles: Vec<[u32; 3]>,
+    /// Whether parts of it may lie inside others: of a file's mesh, not of the zero set of a field.
+    #[serde(default = "unknown")]
+    pub may_overlap: bool,
+}
+
+/// Checkpoints of before do not say.
+const fn unknown() -> bool {
+    true
 }
 
 impl SolidParts {
     /// Of a key frame; `None` if it is neither a closed mesh nor has normals, or its points close to nothing.
     pub(crate) fn of(key: &Keyframe) -> Option<Self> {
-        let of = |mesh: Mesh<f32>| Self {
+        let of = |mesh: Mesh<f32>, may_overlap| Self {
             points: mesh.vertices,
             triangles: mesh.triangles,
+            may_overlap,
         };
         match &key.mesh {
-            Some(mesh) => Some(of(mesh.clone())),
-            None => reconstruct(&key.cloud.points, key.cloud.normals.as_ref()?).map(of),
+            Some(mesh) => Some(of(mesh.clone(), true)),
+            None => {
+                let closed = reconstruct(&key.cloud.points, key.cloud.normals.as_ref()?);
+                closed.map(|mesh| of(mesh, false))
+            }
         }
     }
 
@@ -77,7 +89,7 @@ impl Solid {
         }
         let mesh = Mesh::new(parts.points.clone(), parts.triangles.clone());
         let search = TriangleSearch::new(&mesh)?;
-        let overlaps = overlaps(&search);
+        let overlaps = parts.may_overlap && overlaps(&search);
         let exact = Exact { search, overlaps };
         let far = FarField::new(&parts.points, |places| exact.distances(places));
         Some(Self { parts, exact, far })
@@ -182,6 +194,7 @@ mod tests {
                 .map(|x| x.map(|part| part as f32))
                 .collect(),
             triangles: mesh.triangles.clone(),
+            may_overlap: true,
         }
     }
 

@@ -65,7 +65,9 @@ impl Solved {
                 keyframes.keys.len()
             ));
         };
-        let (source, target) = (solid(first, "source")?, solid(last, "target")?);
+        // Arranging the triangles of one shape takes one core.
+        let (source, target) = rayon::join(|| solid(first, "source"), || solid(last, "target"));
+        let (source, target) = (source?, target?);
         let solver = Solver::new(problem(recipe, keyframes), weights(recipe), options(recipe));
         let solver = solver.map_err(|error| format!("velocity.kind = \"spline\": {error}"))?;
         Ok(Self {

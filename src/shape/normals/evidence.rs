@@ -12,8 +12,6 @@
 //! The paper takes its normals from the dipoles and solves a dense regularised system; here only the signs are
 //! taken, as evidence beside that of the neighbours, and the few steps are the regularisation.
 
-use rayon::prelude::*;
-
 use crate::geometry::linear::dot;
 use crate::geometry::winding::{Charges, SummationTree};
 
@@ -36,7 +34,6 @@ pub(super) fn outward(
         tree: SummationTree::new(points, softening),
         points,
         areas,
-        softening,
     };
     let dipoles = problem.solve();
     let clear = |((dipole, normal), &area): ((&[f64; 3], &[f64; 3]), &f64)| {
@@ -55,7 +52,6 @@ struct Problem<'a> {
     tree: SummationTree,
     points: &'a [[f64; 3]],
     areas: &'a [f64],
-    softening: &'a [f64],
 }
 
 impl Problem<'_> {
@@ -64,7 +60,7 @@ impl Problem<'_> {
     ///
     /// Not `isomorph_model::linear::conjugate_gradient` on the normal equations: that takes the
     /// curvature from the product of the direction with `W^T W` of it, and `W^T` is only close to the
-    /// adjoint of `W` here ([`SummationTree::pull`]). Here the curvature is a sum of squares, which
+    /// adjoint of `W` here ([`SummationTree::pull_at_points`]). Here the curvature is a sum of squares, which
     /// cannot be negative, and the residual is that of the equations themselves.
     fn solve(&self) -> Vec<[f64; 3]> {
         let mut dipoles = vec![[0.0; 3]; self.points.len()];
@@ -99,32 +95,20 @@ impl Problem<'_> {
     /// The winding numbers about the points.
     fn winding(&self, dipoles: &[[f64; 3]]) -> Vec<f64> {
         let charges: Charges<3> = self.tree.charges(dipoles);
-        self.at_each(|k| self.tree.winding(&charges, self.points[k]))
+        self.tree.winding_at_points(&charges)
     }
 
     /// The steepest descent in dipoles, and its slope.
     fn gradient(&self, residual: &[f64]) -> (Vec<[f64; 3]>, f64) {
         let weighted = residual.iter().zip(self.areas).map(|(r, a)| [r * a]);
         let charges: Charges<1> = self.tree.charges(&weighted.collect::<Vec<_>>());
-        let pulls = self.at_each(|k| self.tree.pull(&charges, self.points[k], self.softening[k]));
+        let pulls = self.tree.pull_at_points(&charges);
         let scaled = pulls.iter().zip(self.areas);
         let scaled: Vec<[f64; 3]> = scaled.map(|(pull, area)| pull.map(|x| x * area)).collect();
         // Summed in order: the same on any number of cores.
         let slope = pulls.iter().zip(&scaled).map(|(a, b)| dot(*a, *b));
         let slope = slope.sum();
         (scaled, slope)
-    }
-
-    /// A value of each point, on all cores; points that lie together one after the other, since
-    /// they read the same parts of the tree.
-    fn at_each<T: Clone + Default + Send>(&self, value: impl Fn(usize) -> T + Sync) -> Vec<T> {
-        let order = self.tree.order();
-        let found: Vec<T> = (order.par_iter().map(|&k| value(k as usize))).collect();
-        let mut values = vec![T::default(); found.len()];
-        for (&k, value) in order.iter().zip(found) {
-            values[k as usize] = value;
-        }
-        values
     }
 }
 
