@@ -1,6 +1,6 @@
 //! How the triangles of a mesh share their edges, vertices at one place being one vertex.
 
-use std::collections::HashMap;
+use rustc_hash::FxHashMap;
 
 use super::linear::Scalar;
 use super::mesh::Mesh;
@@ -22,8 +22,8 @@ impl EdgeSharing {
     pub(crate) fn of<T: Scalar>(mesh: &Mesh<T>) -> Self {
         // For each undirected edge: how many triangles run along it upwards and downwards.
         let welded = weld(&mesh.vertices);
-        let mut runs: HashMap<(u32, u32), [u32; 2]> =
-            HashMap::with_capacity(mesh.triangles.len() * 2);
+        let mut runs: FxHashMap<(u32, u32), [u32; 2]> = FxHashMap::default();
+        runs.reserve(mesh.triangles.len() * 2);
         for triangle in &mesh.triangles {
             let [a, b, c] = triangle.map(|index| welded[index as usize]);
             // Without area it hides no gap and makes none.
@@ -58,7 +58,8 @@ impl EdgeSharing {
 /// # Panics
 /// If there are 2^32 vertices or more.
 pub(crate) fn weld<T: Scalar>(vertices: &[[T; 3]]) -> Vec<u32> {
-    let mut first = HashMap::with_capacity(vertices.len());
+    let mut first = FxHashMap::default();
+    first.reserve(vertices.len());
     let indices = 0..u32::try_from(vertices.len()).expect("triangles index vertices by u32");
     // Adding zero makes -0.0 and 0.0 the same bits.
     let key = |index: u32| vertices[index as usize].map(|part| (part.into() + 0.0_f64).to_bits());

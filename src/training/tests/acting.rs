@@ -69,7 +69,7 @@ const OTHER: [(&str, &[&str]); 58] = [
     ("training.optimiser=muon", &[]),
     ("training.learning-rate=1e-3", &[]),
     ("training.velocity-learning-rate=1e-3", &[]),
-    ("training.muon-rate=1e-3", &["training.optimiser=muon"]),
+    ("training.muon-rate=2e-3", &["training.optimiser=muon"]),
     (
         "training.velocity-muon-rate=1e-3",
         &["training.optimiser=muon"],
