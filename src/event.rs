@@ -38,6 +38,24 @@ pub struct StepReport {
     pub peak_memory_bytes: Option<u64>,
 }
 
+/// Work before the first step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Preparation {
+    /// Points of the shapes are sampled, and normals estimated where there are none.
+    Points,
+    /// Clouds are closed to meshes, and meshes arranged for exact distances.
+    Distances,
+}
+
+impl fmt::Display for Preparation {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Self::Points => "sampling points and normals",
+            Self::Distances => "preparing exact distances",
+        })
+    }
+}
+
 /// Something that happened during matching, training, extraction or measuring.
 #[non_exhaustive]
 #[derive(Clone, Debug, PartialEq)]
@@ -61,6 +79,8 @@ pub enum Event {
     },
     /// Something that a user should read, in a sentence.
     Note(String),
+    /// Work before the first step begins that has no steps of its own.
+    Preparing(Preparation),
     /// Pairs of two shapes are being found, which takes a few seconds.
     Matching {
         /// What is done now.
@@ -128,6 +148,8 @@ pub enum Event {
         /// Whether the box that was searched cuts it off.
         touches_box: bool,
     },
+    /// All surfaces lie on the disk, and the picture of them is being drawn.
+    Drawing,
     /// Frames are being measured against the ground truth.
     Measuring {
         /// Frames done; none while the best times are found.

@@ -44,6 +44,7 @@ mod kinds;
 mod matching;
 mod memory;
 mod picture;
+mod processor;
 mod session;
 mod shape;
 mod solved;
@@ -94,9 +95,10 @@ pub mod comparison {
     pub use crate::session::compare::{CompareOptions, compare, known};
 }
 
-/// What a training step costs on this machine.
+/// What a training step and a whole run cost on this machine.
 pub mod benchmark {
     pub use crate::session::bench::{
         BenchOptions, Measured, PhaseCost, Phases, Size, bench, unused,
     };
+    pub use crate::session::bench_run::{BenchRun, Cost, Job, MeasuredRun, StageCost, bench_run};
 }

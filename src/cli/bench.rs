@@ -1,13 +1,20 @@
-//! `isomorph bench`: what a training step costs on this machine.
+//! `isomorph bench`: what a training step, or a whole run of the preset instant, costs on this machine.
 
 use std::fmt::Write;
+use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use isomorph::benchmark::{self, BenchOptions, Measured, unused};
+use isomorph::benchmark::{
+    self, BenchOptions, BenchRun, Job, Measured, MeasuredRun, StageCost, unused,
+};
 
 use super::{BackendArgs, Result, print};
 
-/// Measure a training step: seconds, arithmetic, memory and efficiency
+/// Measure a training step, or a whole run of the preset instant: seconds, memory and efficiency
+///
+/// `--size instant` measures a whole run stage by stage: files, points and normals, exact distances, steps,
+/// surfaces, picture. The shapes are a rod and the same rod bent; `--recipe` takes those of a recipe, with its
+/// preset. All other sizes measure a step.
 ///
 /// The shapes are two spheres of points. The step is that of the preset quick or default, or that of the
 /// preset paper at one of three sizes. The step of paper has smoothness with its Laplacian, divergence,
@@ -35,12 +42,26 @@ pub(super) struct BenchArgs {
     #[arg(long)]
     json: bool,
 
+    /// Measure the whole run of this recipe, stage by stage
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["size", "derivatives", "vertices", "bend"])]
+    recipe: Option<PathBuf>,
+
+    /// Vertices of the rod of `--size instant`
+    #[arg(long, value_name = "N", default_value_t = 5000, value_parser = clap::value_parser!(u32).range(100..=10_000_000))]
+    vertices: u32,
+
+    /// How far the rod of `--size instant` is bent
+    #[arg(long, value_name = "DEGREES", default_value_t = 60.0)]
+    bend: f64,
+
     #[command(flatten)]
     place: BackendArgs,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum Size {
+    /// A whole run of the preset instant
+    Instant,
     /// Preset quick, with its networks, points and terms
     Quick,
     /// Preset default
@@ -61,46 +82,102 @@ enum Way {
     Forward,
 }
 
-impl From<Size> for benchmark::Size {
-    fn from(size: Size) -> Self {
-        match size {
-            Size::Quick => Self::Quick,
-            Size::Default => Self::Default,
-            Size::Small => Self::Small,
-            Size::Shipped => Self::Shipped,
-            Size::Paper => Self::Paper,
-        }
+impl Size {
+    /// The step that is measured; none of a whole run.
+    const fn step(self) -> Option<benchmark::Size> {
+        Some(match self {
+            Self::Instant => return None,
+            Self::Quick => benchmark::Size::Quick,
+            Self::Default => benchmark::Size::Default,
+            Self::Small => benchmark::Size::Small,
+            Self::Shipped => benchmark::Size::Shipped,
+            Self::Paper => benchmark::Size::Paper,
+        })
     }
 }
 
 pub(super) fn run(args: BenchArgs) -> Result {
-    let measured = benchmark::bench(&BenchOptions {
-        size: args.size.into(),
-        derivatives: match args.derivatives {
-            Way::Nested => "nested",
-            Way::Forward => "forward",
-        },
-        repeats: args.repeats as usize,
-        changes: args.set,
-        backend: args.place.backend()?,
-    })?;
-    if args.json {
-        print(&(serde_json::to_string(&measured)? + "\n"))?;
-    } else {
-        print(&table(&measured))?;
-    }
+    let (json, text) = match (&args.recipe, args.size.step()) {
+        (None, Some(size)) => of_step(&args, size)?,
+        _ => of_run(&args)?,
+    };
+    print(if args.json { &json } else { &text })?;
     for warning in unused() {
         eprintln!("isomorph: bench: {warning}");
     }
     Ok(())
 }
 
-/// What is printed for people.
-fn table(measured: &Measured) -> String {
-    let peak = measured.peak_bytes.map_or_else(
+/// What a step costs, as JSON and for people.
+fn of_step(args: &BenchArgs, size: benchmark::Size) -> Result<(String, String)> {
+    let measured = benchmark::bench(&BenchOptions {
+        size,
+        derivatives: match args.derivatives {
+            Way::Nested => "nested",
+            Way::Forward => "forward",
+        },
+        repeats: args.repeats as usize,
+        changes: args.set.clone(),
+        backend: args.place.backend()?,
+    })?;
+    Ok((serde_json::to_string(&measured)? + "\n", table(&measured)))
+}
+
+/// What a whole run costs, as JSON and for people.
+fn of_run(args: &BenchArgs) -> Result<(String, String)> {
+    let rod = Job::Rod {
+        vertices: args.vertices as usize,
+        bend: args.bend,
+    };
+    let measured = benchmark::bench_run(&BenchRun {
+        job: args.recipe.clone().map_or(rod, Job::Recipe),
+        repeats: args.repeats as usize,
+        changes: args.set.clone(),
+        backend: args.place.backend()?,
+    })?;
+    Ok((serde_json::to_string(&measured)? + "\n", stages(&measured)))
+}
+
+/// Peak memory for people.
+fn megabytes(bytes: Option<u64>) -> String {
+    bytes.map_or_else(
         || "unknown".to_owned(),
         |bytes| format!("{:.0} MB", bytes as f64 / 1e6),
+    )
+}
+
+/// The stages of a run for people.
+fn stages(measured: &MeasuredRun) -> String {
+    let vertices: Vec<String> = measured.vertices.iter().map(usize::to_string).collect();
+    let mut table = format!(
+        "{}, {} threads; shapes of {} vertices; peak memory {}\n\
+         stage                 seconds   processor seconds   share\n",
+        measured.backend,
+        measured.threads,
+        vertices.join(" and "),
+        megabytes(measured.peak_bytes),
     );
+    let whole = StageCost {
+        name: "whole run",
+        cost: measured.whole,
+    };
+    for StageCost { name, cost } in measured.stages.iter().chain([&whole]) {
+        let worked = cost.cpu_seconds;
+        let worked = worked.map_or_else(|| "unknown".to_owned(), |seconds| format!("{seconds:.2}"));
+        // Writing to a string does not fail.
+        let _ = writeln!(
+            table,
+            "{name:20} {:8.2} {worked:>19} {:6.0} %",
+            cost.seconds,
+            100.0 * cost.share
+        );
+    }
+    table
+}
+
+/// What is printed for people.
+fn table(measured: &Measured) -> String {
+    let peak = megabytes(measured.peak_bytes);
     let mut table = format!(
         "{}, {}, {} derivatives; matrix product {:.0} GFLOP/s; peak memory {peak}\n\
          phase      s/step   first step   GFLOP/step   efficiency\n",

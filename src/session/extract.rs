@@ -117,6 +117,7 @@ impl Trained {
                 options.times.len()
             )));
         }
+        emit(Event::Drawing)?;
         show(&frames, &frame_options)?;
         Ok(frame_options.folder.join("frames.json"))
     }

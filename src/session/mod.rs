@@ -9,7 +9,7 @@
 //! | `evaluate.rs`, `measure.rs` | a run held against the true frames between its key frames |
 //! | `compare.rs`, `compared.rs` | methods side by side on pairs of frames |
 //! | `pairs.rs`, `normals.rs` | correspondences and normals found from shapes alone |
-//! | `bench.rs` | what a step costs on this machine |
+//! | `bench.rs`, `bench_run.rs` | what a step and what a whole run costs on this machine |
 //! | `describe.rs` | what a file or a run is |
 //! | `prepare.rs` | the shapes of a recipe made ready |
 //! | `learner.rs` | the loop that trains a method |
@@ -19,6 +19,7 @@
 //! | `stop.rs` | a flag that ends the work early |
 
 pub(crate) mod bench;
+pub(crate) mod bench_run;
 pub(crate) mod checkpoint;
 pub(crate) mod compare;
 mod compared;

@@ -2,8 +2,10 @@
 
 use std::path::Path;
 
+use isomorph_training::method::spline::is_solved;
+
 use crate::error::Result;
-use crate::event::Event;
+use crate::event::{Event, Preparation};
 use crate::formats::{self, Shape};
 use crate::matching::{MatchOptions, Matching, match_shapes};
 use crate::recipe::{self, Recipe};
@@ -57,7 +59,11 @@ pub(super) fn prepare(
             }
         });
     }
+    emit(&Event::Preparing(Preparation::Points));
     let keyframes = shape::prepare(shapes, &options(recipe, between))?;
+    if is_solved(recipe) {
+        emit(&Event::Preparing(Preparation::Distances));
+    }
     Ok(Prepared { keyframes, found })
 }
 

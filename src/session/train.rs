@@ -147,6 +147,12 @@ impl Session {
         Self { stop, ..self }
     }
 
+    /// Vertices of each of the shapes.
+    pub(super) fn sizes(&self) -> Vec<usize> {
+        let each = self.shapes.iter();
+        each.map(|shape| shape.mesh.vertices.len()).collect()
+    }
+
     /// The recipe, every key with its value.
     pub fn recipe(&self) -> &Recipe {
         &self.recipe
