@@ -70,6 +70,11 @@ pub mod metrics {
     pub use crate::session::metrics::{Metrics, TermMetrics};
 }
 
+/// Two files to an animation: a recipe chosen for them, and doubts about the result in words.
+pub mod morph {
+    pub use crate::session::morph::{Doubt, MorphOptions, MorphPlan, MorphWatch, plan_morph};
+}
+
 /// Corresponding vertices of two shapes, found from the shapes alone.
 pub mod correspondence {
     pub use crate::matching::{

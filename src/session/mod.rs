@@ -9,6 +9,7 @@
 //! | `evaluate.rs`, `measure.rs` | a run held against the true frames between its key frames |
 //! | `compare.rs`, `compared.rs` | methods side by side on pairs of frames |
 //! | `pairs.rs`, `normals.rs` | correspondences and normals found from shapes alone |
+//! | `morph.rs`, `morph_size.rs` | a recipe for two files, what it assumes, and what speaks against the result |
 //! | `bench.rs`, `bench_run.rs` | what a step and what a whole run costs on this machine |
 //! | `describe.rs` | what a file or a run is |
 //! | `prepare.rs` | the shapes of a recipe made ready |
@@ -32,6 +33,8 @@ pub(crate) mod learner;
 mod log;
 mod measure;
 pub(crate) mod metrics;
+pub(crate) mod morph;
+mod morph_size;
 pub(crate) mod normals;
 pub(crate) mod pairs;
 mod prepare;

@@ -1,0 +1,295 @@
+//! Two files and nothing else: a recipe chosen for them, what it takes for granted, and what speaks against the
+//! result.
+
+use std::path::{Path, PathBuf};
+
+use super::morph_size::Extent;
+use crate::error::Result;
+use crate::event::Event;
+use crate::formats::Shape;
+use crate::geometry::EdgeSharing;
+use crate::recipe::Recipe;
+
+/// What is asked for beyond the two files.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MorphOptions {
+    /// Pairs of points: a value of `data.correspondences`; chosen by the files without it.
+    pub pairs: Option<String>,
+    /// The preset.
+    pub preset: String,
+    /// Surfaces at even times.
+    pub frames: usize,
+    /// Other keys of the recipe, as in `result.resolution=256`.
+    pub changes: Vec<String>,
+}
+
+/// A recipe for two files, and what was assumed for it.
+#[derive(Clone, Debug)]
+pub struct MorphPlan {
+    /// The recipe.
+    pub recipe: Recipe,
+    /// What it takes for granted, in sentences.
+    pub assumed: Vec<String>,
+    /// What may well be wrong with it.
+    pub doubts: Vec<Doubt>,
+}
+
+/// Something that speaks against a result.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Doubt {
+    /// What was found.
+    pub finding: String,
+    /// What to try next.
+    pub cure: String,
+}
+
+impl Doubt {
+    pub(super) fn new(finding: String, cure: &str) -> Self {
+        Self {
+            finding,
+            cure: cure.to_owned(),
+        }
+    }
+}
+
+/// Chooses a recipe for a morph from `source` to `target`.
+///
+/// # Errors
+/// A file that cannot be read, a key that is refused.
+pub fn plan_morph(source: &Path, target: &Path, options: &MorphOptions) -> Result<MorphPlan> {
+    let shapes = [Shape::read(source)?, Shape::read(target)?];
+    let same = same_faces(&shapes);
+    let pairs = options.pairs.as_deref();
+    let chosen = pairs.unwrap_or(if same { "same-vertices" } else { "match" });
+    let mut recipe = Recipe::between(source, target)?;
+    recipe.with_all(&[
+        format!("preset={}", options.preset),
+        format!("data.correspondences={chosen}"),
+        format!("result.frames={}", options.frames),
+    ])?;
+    recipe.with_all(&options.changes)?;
+    let mut assumed: Vec<String> = shapes.iter().map(described).collect();
+    let extents = shapes.each_ref().map(Extent::of);
+    assumed.push(format!(
+        "units: those of the files; {} and {} large",
+        extents[0], extents[1]
+    ));
+    assumed.push(format!(
+        "frame: both files are in the same coordinates; their centres are {} apart",
+        extents[0].apart(&extents[1])
+    ));
+    assumed.push(match (chosen, pairs) {
+        ("same-vertices", None) => {
+            "pairs: vertices of equal number, since both files have the same faces".to_owned()
+        }
+        ("same-vertices", Some(_)) => "pairs: vertices of equal number, as you say".to_owned(),
+        ("match", _) => "pairs: found from the shapes alone".to_owned(),
+        ("none", _) => "pairs: none; the nearest parts are drawn together".to_owned(),
+        (file, _) => format!("pairs: those of {file}"),
+    });
+    assumed.push(format!("preset: {}", options.preset));
+    Ok(MorphPlan {
+        recipe,
+        assumed,
+        doubts: extents[0].doubts(&extents[1]),
+    })
+}
+
+/// Whether both are meshes of the same triangles: the same mesh in two poses.
+fn same_faces([source, target]: &[Shape; 2]) -> bool {
+    source.is_mesh()
+        && source.mesh.vertices.len() == target.mesh.vertices.len()
+        && source.mesh.triangles == target.mesh.triangles
+}
+
+/// What a file holds, in a sentence.
+fn described(shape: &Shape) -> String {
+    let (name, count) = (shape.path.display(), shape.mesh.vertices.len());
+    let what = if !shape.is_mesh() {
+        let normals = match shape.mesh.normals {
+            Some(_) => "with normals",
+            None => "without normals, which are estimated",
+        };
+        format!("a cloud of {count} points {normals}")
+    } else if EdgeSharing::of(&shape.mesh).is_closed() {
+        format!("a closed mesh of {count} vertices")
+    } else {
+        format!("a mesh of {count} vertices that is not closed; its holes are closed over")
+    };
+    format!("{name}: {what}")
+}
+
+/// Pairs that lie near less than this share of a shape leave much of it to guessing.
+const LEAST_COVERAGE: f64 = 0.6;
+
+/// A round trip through the pairs that misses by more than this, in normalised units, in the median.
+const MOST_CYCLE: f64 = 0.03;
+
+/// Surface and motion that are further apart than this, in normalised units.
+const MOST_APART: f64 = 0.01;
+
+/// Watches a run, and says at its end what speaks against its result.
+#[derive(Debug, Default)]
+pub struct MorphWatch {
+    doubts: Vec<Doubt>,
+    /// Time, pieces, distance of surface and motion, file.
+    frames: Vec<(f64, usize, Option<f64>, PathBuf)>,
+    cut_off: bool,
+}
+
+impl MorphWatch {
+    /// Takes note of an event of the run.
+    pub fn observe(&mut self, event: &Event) {
+        match event {
+            Event::Matched {
+                coverage: [source, target],
+                cycle: [median, _],
+                ..
+            } => {
+                if source.min(*target) < LEAST_COVERAGE {
+                    let finding = format!(
+                        "pairs were found for {:.0} % of the source and {:.0} % of the target only",
+                        100.0 * source,
+                        100.0 * target
+                    );
+                    self.doubts.push(Doubt::new(finding, GIVE_PAIRS));
+                }
+                if *median > MOST_CYCLE {
+                    let finding = format!(
+                        "the pairs contradict each other: there and back misses by {median:.3} (normalised, median)"
+                    );
+                    self.doubts.push(Doubt::new(finding, GIVE_PAIRS));
+                }
+            }
+            Event::Extracted {
+                time,
+                path,
+                components,
+                consistency,
+                touches_box,
+                ..
+            } => {
+                self.cut_off |= touches_box;
+                let frame = (*time, *components, *consistency, path.clone());
+                self.frames.push(frame);
+            }
+            _ => {}
+        }
+    }
+
+    /// What speaks against the result; nothing if all looks well.
+    pub fn doubts(mut self) -> Vec<Doubt> {
+        let at_ends =
+            |(time, ..): &&(f64, usize, Option<f64>, PathBuf)| *time == 0.0 || *time == 1.0;
+        let whole = self
+            .frames
+            .iter()
+            .filter(at_ends)
+            .map(|frame| frame.1)
+            .max();
+        let worst = self.frames.iter().max_by_key(|frame| frame.1);
+        if let (Some(whole), Some((time, pieces, ..))) = (whole, worst)
+            && *pieces > whole
+        {
+            let finding =
+                format!("the surface at {time:.2} is in {pieces} pieces, at the ends in {whole}");
+            self.doubts.push(Doubt::new(finding, FINER));
+        }
+        let apart = |frame: &&(f64, usize, Option<f64>, PathBuf)| frame.2.unwrap_or(0.0);
+        let worst = self
+            .frames
+            .iter()
+            .max_by(|a, b| apart(a).total_cmp(&apart(b)));
+        if let Some((time, _, Some(off), _)) = worst
+            && *off > MOST_APART
+        {
+            let finding = format!(
+                "surface and motion are {off:.3} apart at {time:.2} (normalised, in the mean)"
+            );
+            self.doubts.push(Doubt::new(finding, LONGER));
+        }
+        if self.cut_off {
+            let finding = "the box cuts a surface off".to_owned();
+            self.doubts
+                .push(Doubt::new(finding, "add --set training.box-margin=0.3"));
+        }
+        self.doubts
+    }
+}
+
+const GIVE_PAIRS: &str = "give a few pairs of points by hand with --pairs FILE (a line `source_index,target_index` \
+     for each), above all at tips of limbs";
+const FINER: &str = "try --set result.resolution=384; if it stays so, parts that touch at one end are torn: give \
+     pairs there with --pairs FILE";
+const LONGER: &str = "try --preset default, which takes minutes, or give pairs with --pairs FILE";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frame(time: f64, components: usize, consistency: f64) -> Event {
+        Event::Extracted {
+            time,
+            path: PathBuf::new(),
+            vertices: 8,
+            triangles: 12,
+            components,
+            left_out: 0,
+            consistency: Some(consistency),
+            touches_box: false,
+        }
+    }
+
+    fn doubts(events: &[Event]) -> Vec<String> {
+        let mut watch = MorphWatch::default();
+        events.iter().for_each(|event| watch.observe(event));
+        watch
+            .doubts()
+            .into_iter()
+            .map(|doubt| doubt.finding)
+            .collect()
+    }
+
+    #[test]
+    fn a_good_run_has_no_doubts() {
+        assert!(
+            doubts(&[
+                frame(0.0, 1, 1e-4),
+                frame(0.5, 1, 2e-3),
+                frame(1.0, 1, 1e-4)
+            ])
+            .is_empty()
+        );
+    }
+
+    #[test]
+    fn a_surface_in_pieces_and_one_off_its_motion_are_named() {
+        let found = doubts(&[
+            frame(0.0, 1, 1e-4),
+            frame(0.5, 3, 0.02),
+            frame(1.0, 2, 1e-4),
+        ]);
+        assert_eq!(found.len(), 2, "{found:?}");
+        assert!(
+            found[0].contains("at 0.50 is in 3 pieces, at the ends in 2"),
+            "{found:?}"
+        );
+        assert!(found[1].contains("0.020 apart at 0.50"), "{found:?}");
+    }
+
+    #[test]
+    fn pairs_of_half_a_shape_are_named() {
+        let matched = Event::Matched {
+            pairs: 10,
+            coverage: [0.9, 0.5],
+            cycle: [0.1, 0.2],
+            seconds: 1.0,
+        };
+        let found = doubts(&[matched]);
+        assert!(
+            found[0].contains("90 % of the source and 50 % of the target"),
+            "{found:?}"
+        );
+        assert!(found[1].contains("misses by 0.100"), "{found:?}");
+    }
+}

@@ -1,0 +1,128 @@
+//! How large a shape is and where, and whether two can be of the same thing in the same frame.
+
+use std::fmt;
+
+use super::morph::Doubt;
+use crate::formats::Shape;
+use crate::geometry::linear::{difference, length};
+
+/// The box round a shape, in the file's coordinates.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Extent {
+    low: [f64; 3],
+    high: [f64; 3],
+}
+
+/// Shapes of one thing whose sizes differ by more than this factor are likely in different units.
+const OTHER_UNIT: f64 = 3.0;
+
+/// Boxes whose centres are further apart than this many of their sizes.
+const FAR_APART: f64 = 1.0;
+
+impl Extent {
+    pub(super) fn of(shape: &Shape) -> Self {
+        let start = Self {
+            low: [f64::INFINITY; 3],
+            high: [f64::NEG_INFINITY; 3],
+        };
+        shape
+            .mesh
+            .vertices
+            .iter()
+            .fold(start, |Self { low, high }, x| Self {
+                low: [0, 1, 2].map(|axis| f64::min(low[axis], x[axis])),
+                high: [0, 1, 2].map(|axis| f64::max(high[axis], x[axis])),
+            })
+    }
+
+    fn sides(&self) -> [f64; 3] {
+        difference(self.high, self.low)
+    }
+
+    fn size(&self) -> f64 {
+        length(self.sides())
+    }
+
+    fn centre(&self) -> [f64; 3] {
+        [0, 1, 2].map(|axis| f64::midpoint(self.low[axis], self.high[axis]))
+    }
+
+    /// The distance of the centres, for people.
+    pub(super) fn apart(&self, other: &Self) -> String {
+        short(length(difference(self.centre(), other.centre())))
+    }
+
+    /// What speaks against these being one thing in one frame.
+    pub(super) fn doubts(&self, other: &Self) -> Vec<Doubt> {
+        let mut doubts = Vec::new();
+        let (small, large) = (self.size().min(other.size()), self.size().max(other.size()));
+        if large > OTHER_UNIT * small {
+            let finding = format!(
+                "one shape is {} times as large as the other",
+                short(large / small)
+            );
+            let cure =
+                "if their units differ, such as metres and millimetres, bring both to one unit";
+            doubts.push(Doubt::new(finding, cure));
+        }
+        let apart = length(difference(self.centre(), other.centre()));
+        if apart > FAR_APART * large {
+            let finding = format!(
+                "the centres of the shapes are {} apart, more than their size",
+                short(apart)
+            );
+            let cure = "the motion will contain this way; lay one shape over the other first if it should not";
+            doubts.push(Doubt::new(finding, cure));
+        }
+        doubts
+    }
+}
+
+impl fmt::Display for Extent {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [x, y, z] = self.sides().map(short);
+        write!(formatter, "{x} x {y} x {z}")
+    }
+}
+
+/// Three significant digits.
+fn short(value: f64) -> String {
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    let digits = 2 - value.abs().log10().floor() as i32;
+    match usize::try_from(digits) {
+        Ok(digits) if digits <= 6 => format!("{value:.digits$}"),
+        Ok(_) => format!("{value:.2e}"),
+        Err(_) => format!("{value:.0}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn block(size: f64, x: f64) -> Extent {
+        Extent {
+            low: [x, 0.0, 0.0],
+            high: [x + size, size, size],
+        }
+    }
+
+    #[test]
+    fn sizes_and_places_that_cannot_be_meant_are_named() {
+        assert!(block(1.0, 0.0).doubts(&block(2.0, 0.5)).is_empty());
+        let found = block(1.0, 0.0).doubts(&block(1000.0, 0.0));
+        assert!(found[0].finding.contains("1000 times"), "{found:?}");
+        let found = block(1.0, 0.0).doubts(&block(1.0, 7.0));
+        assert!(found[0].finding.contains("7.00 apart"), "{found:?}");
+    }
+
+    #[test]
+    fn lengths_have_three_digits() {
+        assert_eq!(
+            [0.012_34, 1.234, 123.4, 12_345.0].map(short),
+            ["0.0123", "1.23", "123", "12345"]
+        );
+    }
+}
