@@ -74,6 +74,9 @@ pub(crate) enum Outcome {
     Interrupted,
 }
 
+/// What stands for the backend of a field that is solved for.
+const SOLVER: &str = "the spline solver";
+
 /// A method, its data, and where training stands.
 pub(crate) struct Learner {
     recipe: Recipe,
@@ -99,17 +102,23 @@ impl Learner {
     ) -> Result<Self, LearnerError> {
         let data = keyframes.training_data();
         method::check(&recipe, &data).map_err(LearnerError::Missing)?;
-        let trainer: Box<dyn Trainer> = if method::spline::is_solved(&recipe) {
+        let is_solved = method::spline::is_solved(&recipe);
+        let trainer: Box<dyn Trainer> = if is_solved {
             let solved = Solved::new(&recipe, keyframes).map_err(LearnerError::Missing)?;
             Box::new(solved)
         } else {
             engine.method(&recipe, &data.bounds)?
         };
+        // A solver of our own, which no backend takes part in.
+        let (backend, device) = match is_solved {
+            true => (SOLVER.to_owned(), "CPU".to_owned()),
+            false => (engine.backend(), engine.device()),
+        };
         Ok(Self {
             trainer,
             normalisation: keyframes.normalisation,
-            backend: engine.backend(),
-            device: engine.device(),
+            backend,
+            device,
             data,
             step: 0,
             seconds: 0.0,

@@ -205,6 +205,7 @@ pub fn fixed_change(before: &Recipe, after: &Recipe) -> Option<(Change, &'static
         let section = change.key.split('.').next().unwrap_or_default();
         let why = match section {
             "method" => "a run keeps its method",
+            _ if change.key == "velocity.kind" => "a run keeps its method",
             "implicit" | "velocity" => "a trained network cannot change its shape",
             _ => fixed.iter().find(|(key, _)| *key == change.key)?.1,
         };

@@ -19,14 +19,14 @@ const FIRST: [(&str, &str); 10] = [
     (
         "preset",
         "Quality against time. Every key that is left out has the preset's value. On two cores \
-         \"instant\" takes about ten seconds, \"quick\" takes about one minute, \"default\" about ten minutes, \"quality\" about an hour. \
+         \"instant\" takes about five seconds, \"quick\" takes about one minute, \"default\" about ten minutes, \"quality\" about an hour. \
          \"paper\" is the method as the paper prints it, and takes hours.",
     ),
     (
         "data.correspondences",
         "Known pairs of points. A few decide where parts go, above all in large motions. \"none\": no \
          pairs. \"same-vertices\": vertices of equal number are pairs. \"match\": isomorph finds \
-         pairs before training, which takes about a minute. A path: a CSV file with \
+         pairs before training, which takes a few seconds. A path: a CSV file with \
          source_index,target_index on each line.",
     ),
     (

@@ -1,0 +1,145 @@
+//! `isomorph morph`: two files to an animation, without a recipe.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use isomorph::morph::{Doubt, MorphOptions, MorphWatch, plan_morph};
+use isomorph::{Event, OutputFormat, Precision, Session, is_run};
+
+use super::view::show;
+use super::{BackendArgs, Failure, QuietArgs, Result, SetArgs, print, stop_on_interrupt};
+
+/// Turn one shape into another: an animation and a page to look at, from two files
+///
+/// No recipe is needed. Pairs of points are found, or taken from vertices of equal number where both files have
+/// the same faces. What is assumed is printed first, and what speaks against the result last. The folder
+/// receives report.html, meshes/carried.glb, meshes/surface.glb and recipe.toml, which repeats it all.
+#[derive(Debug, Args)]
+pub(super) struct MorphArgs {
+    /// Shape at time 0, a mesh or point cloud as PLY or OBJ
+    source: PathBuf,
+
+    /// Shape at time 1
+    target: PathBuf,
+
+    /// Folder of the result [default: runs/SOURCE-TARGET]
+    #[arg(long, short, value_name = "DIR")]
+    output: Option<PathBuf>,
+
+    /// Pairs of points: a CSV file with source_index,target_index on each line, same-vertices, match or none
+    #[arg(long, value_name = "FILE")]
+    pairs: Option<String>,
+
+    /// Values of all other keys: instant, quick, default, quality or paper
+    #[arg(long, default_value = "instant")]
+    preset: String,
+
+    /// Number of times in the animation, evenly from 0 to 1
+    #[arg(long, value_name = "N", default_value_t = 13, value_parser = clap::value_parser!(u32).range(2..=1000))]
+    frames: u32,
+
+    /// Open the page in the browser at the end
+    #[arg(long)]
+    open: bool,
+
+    /// Replace an existing run
+    #[arg(long)]
+    force: bool,
+
+    #[command(flatten)]
+    set: SetArgs,
+
+    #[command(flatten)]
+    place: BackendArgs,
+
+    #[command(flatten)]
+    quiet: QuietArgs,
+}
+
+pub(super) fn run(args: MorphArgs) -> Result {
+    let folder = args.output.clone();
+    let folder = folder.unwrap_or_else(|| default_folder(&args.source, &args.target));
+    if !args.force && is_run(&folder) {
+        let folder = folder.display();
+        return Err(Failure::Usage(format!(
+            "{folder}: exists already; choose another with -o, or replace it with --force"
+        )));
+    }
+    let plan = plan_morph(
+        &args.source,
+        &args.target,
+        &MorphOptions {
+            pairs: args.pairs,
+            preset: args.preset,
+            frames: args.frames as usize,
+            changes: args.set.overrides,
+        },
+    )?;
+    if !args.quiet.quiet {
+        plan.assumed.iter().for_each(|text| eprintln!("{text}"));
+        plan.doubts.iter().for_each(warn);
+    }
+    let session = Session::prepare(plan.recipe, &folder, args.place.backend()?)?
+        .stopped_by(stop_on_interrupt())
+        .writing(OutputFormat::Animation(Precision::Full), true);
+    let mut session = if args.force {
+        session.replacing()
+    } else {
+        session
+    };
+    let mut terminal = args.quiet.terminal(&folder);
+    let (mut watch, mut page) = (MorphWatch::default(), None);
+    session.train(|event| {
+        watch.observe(event);
+        if let Event::Reported { path } = event {
+            page = Some(path.clone());
+        }
+        terminal.show(event);
+    })?;
+    let doubts = watch.doubts();
+    doubts.iter().for_each(warn);
+    if doubts.is_empty() && plan.doubts.is_empty() && !args.quiet.quiet {
+        eprintln!("nothing speaks against the result: one look at the page is still worth it");
+    }
+    print(&written(&folder, page.as_deref()))?;
+    if let Some(page) = page.filter(|_| args.open) {
+        show(&page);
+    }
+    Ok(())
+}
+
+/// A doubt, and what to do about it.
+fn warn(doubt: &Doubt) {
+    eprintln!("doubtful: {}; {}", doubt.finding, doubt.cure);
+}
+
+/// The files that matter, each with what it is for.
+fn written(folder: &Path, page: Option<&Path>) -> String {
+    let meshes = folder.join("meshes");
+    let named = [
+        (page.map(Path::to_path_buf), "look at it in a browser"),
+        (Some(meshes.join("carried.glb")), "your mesh moving, for Blender and the web"),
+        (Some(meshes.join("surface.glb")), "the surfaces in turn"),
+        (Some(folder.join("recipe.toml")), "repeats this with `isomorph train`"),
+    ];
+    let lines = named.into_iter().filter_map(|(path, what)| Some((path?, what)));
+    let there = lines.filter(|(path, _)| path.is_file());
+    there.map(|(path, what)| format!("{}  {what}\n", path.display())).collect()
+}
+
+/// `runs/` and the names of both files: `scans/a.ply` and `b.ply` go to `runs/a-b`.
+fn default_folder(source: &Path, target: &Path) -> PathBuf {
+    let name = |path: &Path| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    Path::new("runs").join(format!("{}-{}", name(source), name(target)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_is_named_after_both_files() {
+        let folder = default_folder(Path::new("scans/a.ply"), Path::new("b.obj"));
+        assert_eq!(folder, Path::new("runs/a-b"));
+    }
+}
