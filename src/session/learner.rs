@@ -14,7 +14,7 @@ use crate::event::{Event, StepReport, TermReport};
 use crate::memory;
 use crate::recipe::{Change, Recipe};
 use crate::shape::{Keyframes, Normalisation};
-use crate::solved::Solved;
+use crate::solved::{Solved, guide, is_guided};
 
 /// Why training stopped before its last step.
 #[derive(Debug, thiserror::Error)]
@@ -100,8 +100,21 @@ impl Learner {
         keyframes: &Keyframes,
         engine: &dyn Engine,
     ) -> Result<Self, LearnerError> {
-        let data = keyframes.training_data();
+        Self::at(0, recipe, keyframes, engine)
+    }
+
+    /// A learner with the networks as they are made, for the steps from this one on.
+    fn at(
+        step: usize,
+        recipe: Recipe,
+        keyframes: &Keyframes,
+        engine: &dyn Engine,
+    ) -> Result<Self, LearnerError> {
+        let mut data = keyframes.training_data();
         method::check(&recipe, &data).map_err(LearnerError::Missing)?;
+        if is_guided(&recipe, step) {
+            data.guide = Some(guide(&recipe, keyframes).map_err(LearnerError::Missing)?);
+        }
         let is_solved = method::spline::is_solved(&recipe);
         let trainer: Box<dyn Trainer> = if is_solved {
             let solved = Solved::new(&recipe, keyframes).map_err(LearnerError::Missing)?;
@@ -120,7 +133,7 @@ impl Learner {
             backend,
             device,
             data,
-            step: 0,
+            step,
             seconds: 0.0,
             recipe,
         })
@@ -138,10 +151,9 @@ impl Learner {
         checkpoint: &Checkpoint,
     ) -> Result<Self, LearnerError> {
         fits(checkpoint, &recipe, keyframes)?;
-        let mut learner = Self::new(recipe, keyframes, engine)?;
+        let mut learner = Self::at(checkpoint.state.step, recipe, keyframes, engine)?;
         let restored = learner.trainer.restore(&checkpoint.records()?);
         restored.map_err(|error| checkpoint.damaged(error))?;
-        learner.step = checkpoint.state.step;
         learner.seconds = checkpoint.state.seconds;
         Ok(learner)
     }

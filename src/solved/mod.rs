@@ -5,11 +5,13 @@
 //! |---|---|
 //! | `mod.rs` | [`Solved`], which makes one step of Gauss-Newton where others make one of an optimiser |
 //! | `carried.rs` | surfaces and motion of its field |
+//! | `guide.rs` | the field as what a network learns first |
 //! | `stored.rs` | its part of a checkpoint |
 //!
 //! The mathematics is in the package `isomorph-spline`, the distance of a shape in [`crate::shape`].
 
 mod carried;
+mod guide;
 mod stored;
 #[cfg(test)]
 mod tests;
@@ -28,6 +30,7 @@ use isomorph_training::records::{RecordError, Records};
 use isomorph_training::report::{Phase, Rates, TermReport};
 
 use self::carried::CarriedShapes;
+pub(crate) use self::guide::{guide, is_guided};
 use crate::recipe::Recipe;
 use crate::shape::{Keyframe, Keyframes, Solid, SolidParts};
 

@@ -63,6 +63,15 @@ pub trait Surroundings: Send + Sync {
     fn nearest(&self, point: usize, count: NonZeroUsize) -> Vec<usize>;
 }
 
+/// A velocity field that is there before training, between two key frames.
+pub trait Guide: Send + Sync {
+    /// The velocities at places and their times.
+    fn velocities(&self, places: &[[f32; 3]], times: &[f32]) -> Vec<[f32; 3]>;
+
+    /// Where places at the times `from` are at the times `to`.
+    fn carried(&self, places: &[[f32; 3]], from: &[f32], to: &[f32]) -> Vec<[f32; 3]>;
+}
+
 /// The points of one key frame, normalised.
 pub struct KeyPoints {
     /// Its time, 0 to 1.
@@ -86,6 +95,8 @@ pub struct TrainingData {
     pub between: Vec<Vec<PointPair>>,
     /// The box around all key frames.
     pub bounds: Bounds,
+    /// What the velocity field learns from first, where the recipe says so.
+    pub guide: Option<Box<dyn Guide>>,
 }
 
 impl TrainingData {
@@ -102,6 +113,7 @@ impl TrainingData {
             bounds: bounds.expect("two key frames have a box"),
             keys,
             between,
+            guide: None,
         }
     }
 

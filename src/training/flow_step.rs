@@ -17,10 +17,16 @@ use isomorph_model::flow::end_terms::EndSamples;
 use isomorph_model::loss::data;
 use isomorph_model::{ImplicitNet, Objective, TrainBackend};
 
+use crate::guided::Guided;
 use crate::motion::{Motion, has_priors};
 use crate::report::Phase;
 use crate::samples::Batch;
 use crate::settings::end_weights;
+use crate::tensors::{column, rows};
+
+/// The weight of the squared distance from the guide: one term alone, so that it only has to keep gradients
+/// well below training.clip and above the optimiser's epsilon.
+const GUIDE_WEIGHT: f64 = 100.0;
 
 /// What one step is made from.
 pub(crate) struct FlowStep<'a, B: TrainBackend> {
@@ -39,16 +45,38 @@ pub(crate) struct FlowStep<'a, B: TrainBackend> {
 impl<B: TrainBackend> FlowStep<'_, B> {
     /// The terms of the objective: of the end fields at `samples`, of the source and of the target, and of
     /// the velocity field at the batch.
-    pub(crate) fn objective(&self, batch: &Batch, samples: [&EndSamples<B>; 2]) -> Objective<B> {
+    ///
+    /// In the phase [`Phase::Guided`] the velocity field has one term, its mean squared distance from the guide.
+    pub(crate) fn objective(
+        &self,
+        batch: &Batch,
+        guided: &Guided,
+        samples: [&EndSamples<B>; 2],
+    ) -> Objective<B> {
         let settings = self.motion.settings;
         let weights = end_weights(&settings.loss);
         let mut objective = self
             .ends
             .objective(samples, &weights, &settings.derivatives);
-        if self.phase != Phase::ImplicitOnly {
-            self.motion_terms(batch, &mut objective);
+        match self.phase {
+            Phase::ImplicitOnly => {}
+            Phase::Guided => self.guide_term(guided, &mut objective),
+            _ => self.motion_terms(batch, &mut objective),
         }
         objective
+    }
+
+    fn guide_term(&self, guided: &Guided, objective: &mut Objective<B>) {
+        objective.add("guide", GUIDE_WEIGHT, || {
+            let device = self.motion.device;
+            let (x, t) = (
+                rows(&guided.at.points, device),
+                column(&guided.at.times, device),
+            );
+            let off = self.motion.v.forward(x, t) - rows(&guided.velocities, device);
+            // Of the vector, not of its three parts.
+            off.square().mean() * 3.0
+        });
     }
 
     fn motion_terms(&self, batch: &Batch, objective: &mut Objective<B>) {

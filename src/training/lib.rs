@@ -10,6 +10,7 @@
 //! | `recipe/` | the TOML file that decides a run, typed, checked and printed back |
 //! | `data.rs` | key frames as points: what methods draw their samples from |
 //! | `samples.rs` | the samples of a step, on the host, and their equal parts |
+//! | `guided.rs` | what V learns from a field that is there already |
 //! | `method/` | what is trained: the default method and those that it is compared with, one file each |
 //! | `settings.rs` | the recipe in the model's types |
 //! | `schedule.rs` | phases, ramp and learning rates by step |
@@ -36,6 +37,7 @@ pub mod deformation;
 pub mod engine;
 pub mod flop;
 mod flow_step;
+pub mod guided;
 pub mod method;
 mod motion;
 mod network_step;

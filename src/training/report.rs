@@ -10,6 +10,8 @@ use serde::{Deserialize, Serialize};
 pub enum Phase {
     /// Only the Velocity-Net trains.
     WarmUp,
+    /// Both train, the Velocity-Net towards a velocity field that is there already.
+    Guided,
     /// Both train; the weight of the coupled terms of f grows.
     Ramp,
     /// Both train with full weights.
@@ -28,6 +30,7 @@ impl fmt::Display for Phase {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         formatter.pad(match self {
             Self::WarmUp => "velocity warm-up",
+            Self::Guided => "guided",
             Self::Ramp => "ramp",
             Self::Joint => "joint",
             Self::ImplicitOnly => "implicit only",

@@ -22,6 +22,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::data::{Bounds, KeyPoints, TrainingData};
+use crate::guided::Guided;
 use crate::recipe::{TimeSampling, TrainingRecipe};
 
 /// What samples are drawn for. The numbers name the streams: they stay, so that a seed keeps its samples.
@@ -120,7 +121,7 @@ impl Part {
     pub const WHOLE: Self = Self { index: 0, of: 1 };
 
     /// This part's share: every `of`-th row, so that the order of what is left stays as it was.
-    fn share<T: Copy>(self, rows: &[T]) -> Vec<T> {
+    pub(crate) fn share<T: Copy>(self, rows: &[T]) -> Vec<T> {
         let rows = rows.iter().skip(self.index).step_by(self.of);
         rows.copied().collect()
     }
@@ -138,7 +139,7 @@ pub struct Samples {
 }
 
 impl Samples {
-    fn part(&self, part: Part) -> Self {
+    pub(crate) fn part(&self, part: Part) -> Self {
         Self {
             points: part.share(&self.points),
             normals: part.share(&self.normals),
@@ -383,6 +384,8 @@ pub struct Drawn {
     pub ends: EndBatch,
     /// Points beside each other on a surface.
     pub neighbours: Neighbouring,
+    /// Of a velocity field that is there already.
+    pub guided: Guided,
 }
 
 impl Drawn {
@@ -407,6 +410,7 @@ impl Drawn {
             batch: self.batch.part(part),
             ends: self.ends.part(part),
             neighbours: self.neighbours.part(part),
+            guided: self.guided.part(part),
         }
     }
 }

@@ -11,6 +11,7 @@ const FIRST_SCALE: f64 = 10.0;
 #[derive(Clone, Debug)]
 pub struct Schedule {
     steps: usize,
+    guided_until: usize,
     warm_up: usize,
     ramp_until: usize,
     velocity_until: usize,
@@ -24,6 +25,7 @@ impl Schedule {
         let at = |share: f64| (share * steps as f64).round() as usize;
         Self {
             steps,
+            guided_until: at(training.guided_until),
             warm_up: at(training.warm_up),
             ramp_until: at(training.ramp_until),
             velocity_until: at(training.velocity_until),
@@ -39,6 +41,11 @@ impl Schedule {
             step if step < self.ramp_until => Phase::Ramp,
             _ => Phase::Joint,
         }
+    }
+
+    /// Whether V learns in this step from a velocity field that is there already.
+    pub fn is_guided(&self, step: usize) -> bool {
+        step < self.guided_until
     }
 
     /// The share, 0 to 1, of the weights that tie `f` to `V`: 0 through the warm-up, then a linear ramp

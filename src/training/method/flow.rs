@@ -12,6 +12,7 @@ use super::spec::{Acts, Keys, MethodSpec, Needs};
 use super::{FIXED_OPTIMISER, Method, Trainee};
 use crate::data::{Bounds, TrainingData};
 use crate::flow_step::FlowStep;
+use crate::guided::Guided;
 use crate::motion::Motion;
 use crate::posed::{Posed, Slopes};
 use crate::recipe::{GeometryKind, Recipe, VelocityKind};
@@ -87,6 +88,9 @@ impl<B: TrainBackend> EndsAndFlow<B> {
 
 impl<B: TrainBackend> Method<B> for EndsAndFlow<B> {
     fn phase(&self, step: usize) -> Phase {
+        if self.schedule.is_guided(step) {
+            return Phase::Guided;
+        }
         // The end fields train from the first step, so that there is no warm-up of the velocity alone.
         match self.schedule.phase(step) {
             Phase::WarmUp => Phase::Ramp,
@@ -114,9 +118,17 @@ impl<B: TrainBackend> Method<B> for EndsAndFlow<B> {
             ends: 0,
             ..BatchSizes::new(training, data)
         };
+        let ends = EndBatch::draw(data, training, step);
+        if self.phase(step) == Phase::Guided {
+            return Drawn {
+                guided: Guided::draw(data, training, sizes, step),
+                ends,
+                ..Drawn::default()
+            };
+        }
         Drawn {
             batch: Batch::draw(data, training, sizes, step),
-            ends: EndBatch::draw(data, training, step),
+            ends,
             ..Drawn::default()
         }
     }
@@ -139,7 +151,7 @@ impl<B: TrainBackend> Method<B> for EndsAndFlow<B> {
             ramp: self.schedule.ramp(step),
             ends: &ends,
         };
-        Posed::new(flow_step.objective(&drawn.batch, [&source, &target]))
+        Posed::new(flow_step.objective(&drawn.batch, &drawn.guided, [&source, &target]))
             .by(ends)
             .by(v)
     }

@@ -34,7 +34,7 @@ pub(super) static NETWORK: MethodSpec = MethodSpec {
         implicit: Keys::All,
         velocity: Keys::All,
         loss: Keys::AllBut(&["distance"]),
-        training: Keys::All,
+        training: Keys::AllBut(&["guided-until"]),
     },
     own: None,
     fixed: &FIXED_OPTIMISER,

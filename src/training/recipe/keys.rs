@@ -246,6 +246,10 @@ section! {
         /// Learning rate at the end of the schedule "cosine".
         final_learning_rate: f64 = 0.02 | 0.02 | 0.02 | 0.02 | 0.02,
             Rule::number(0.0, 1.0).unit("share of the first one").zero("lets it fall to nothing");
+        /// Until then V learns the field of splines that the preset "instant" finds, instead of the terms
+        /// of the motion, and the end fields train beside it. Fewer steps are needed then. Not in the paper.
+        guided_until: f64 = 0 | 0 | 0 | 0 | 0,
+            Rule::number(0.0, 1.0).unit("share of the steps").zero("starts without splines");
         /// End of the warm-up. Until then the weight of on-surface is 0 and matching-warm-up
         /// replaces matching. In "network" only V trains until then; in "flow" the end fields train
         /// throughout. At most ramp-until and velocity-until.
