@@ -40,6 +40,7 @@ mod error;
 mod evaluate;
 mod formats;
 mod geometry;
+mod gltf;
 mod kinds;
 mod matching;
 mod memory;
@@ -55,6 +56,7 @@ pub use error::{Error, ErrorKind, Result};
 pub use event::Event;
 pub use formats::{Shape, SurfaceFormat};
 pub use geometry::{Mesh, Scalar};
+pub use gltf::Precision;
 pub use isomorph_training::recipe;
 pub use recipe::Recipe;
 pub use session::describe::describe;
@@ -64,6 +66,7 @@ pub use session::stop::StopFlag;
 pub use session::trained::{Distances, Surface};
 pub use session::{Session, Trained};
 pub use shape::{Keyframe, Keyframes, PointCloud};
+pub use surface::frames::OutputFormat;
 
 /// What a run logs of its steps: `metrics.jsonl`, written and read.
 pub mod metrics {

@@ -3,14 +3,14 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use isomorph::{ExtractOptions, SurfaceFormat, Trained, even_times};
+use isomorph::{ExtractOptions, OutputFormat, Precision, SurfaceFormat, Trained, even_times};
 
-use super::{BackendArgs, QuietArgs, Result, print, stop_on_interrupt};
+use super::{BackendArgs, Failure, QuietArgs, Result, print, stop_on_interrupt};
 
 /// Write surfaces of a trained run, at any times and in any resolution
 ///
 /// The surfaces have normals and are in the coordinates of the input. They open in MeshLab, Blender and most
-/// viewers. frames.json lists them with their quality measures. preview.png shows them side by side.
+/// viewers. With --format glb they are one animation that Blender and browsers play. frames.json lists them with their quality measures. preview.png shows them side by side.
 #[derive(Debug, Args)]
 pub(super) struct ExtractArgs {
     /// Folder of the run
@@ -36,6 +36,10 @@ pub(super) struct ExtractArgs {
     /// File format
     #[arg(long, value_enum, default_value_t = Format::Ply)]
     format: Format,
+
+    /// With --format glb: positions as 16-bit integers. Half of the size, but fewer programs read it
+    #[arg(long)]
+    compact: bool,
 
     /// Also write the source file with its vertices moved to each time; faces, colours and texture
     /// coordinates are kept
@@ -64,9 +68,29 @@ enum Format {
     Ply,
     /// Wavefront OBJ with normals
     Obj,
+    /// One animated file for all times, binary glTF: surface.glb, and carried.glb with --carry
+    Glb,
+}
+
+/// The files that were asked for.
+fn output_format(format: Format, compact: bool) -> Result<OutputFormat> {
+    let precision = match (format, compact) {
+        (_, false) => Precision::Full,
+        (Format::Glb, true) => Precision::Compact,
+        _ => {
+            let text = "--compact: only --format glb can be compact";
+            return Err(Failure::Usage(text.to_owned()));
+        }
+    };
+    Ok(match format {
+        Format::Ply => OutputFormat::Frames(SurfaceFormat::Ply),
+        Format::Obj => OutputFormat::Frames(SurfaceFormat::Obj),
+        Format::Glb => OutputFormat::Animation(precision),
+    })
 }
 
 pub(super) fn run(args: ExtractArgs) -> Result {
+    let format = output_format(args.format, args.compact)?;
     let trained = Trained::open(&args.run, args.place.backend()?)?;
     let defaults = ExtractOptions::of(trained.recipe());
     let options = ExtractOptions {
@@ -78,10 +102,7 @@ pub(super) fn run(args: ExtractArgs) -> Result {
         resolution: args
             .resolution
             .map_or(defaults.resolution, |cells| cells as usize),
-        format: match args.format {
-            Format::Ply => SurfaceFormat::Ply,
-            Format::Obj => SurfaceFormat::Obj,
-        },
+        format,
         carry: args.carry,
         smallest_component: args
             .smallest_component

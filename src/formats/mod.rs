@@ -7,9 +7,11 @@
 //! | `ply.rs`, `obj.rs`, `anime.rs` | one reader per format: bytes in, [`Shape`] (or [`Sequence`]) out |
 //! | `write.rs` | meshes as new PLY and OBJ files |
 //! | `carry.rs` | the input file again, its vertices moved |
+//! | `appearance.rs` | colours, texture coordinates, groups and materials of a file |
 //! | `error.rs` | what can be wrong with a file |
 
 mod anime;
+mod appearance;
 mod carry;
 mod error;
 #[cfg(test)]
@@ -21,6 +23,7 @@ mod shape;
 mod write;
 
 pub(crate) use anime::Sequence;
+pub(crate) use appearance::Appearance;
 pub(crate) use carry::{CarryError, rewrite_vertices};
 pub(crate) use error::{FEWEST_POINTS, ShapeError};
 pub(crate) use read::read;

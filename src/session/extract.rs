@@ -11,7 +11,7 @@ use crate::event::Event;
 use crate::formats::SurfaceFormat;
 use crate::picture;
 use crate::recipe::Recipe;
-use crate::surface::frames::{Frame, FrameOptions, write_frames};
+use crate::surface::frames::{Frame, FrameOptions, OutputFormat, write_frames};
 
 /// What to write.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,7 +21,7 @@ pub struct ExtractOptions {
     /// Cells of the grid along the longest side of the box.
     pub resolution: usize,
     /// The kind of the files.
-    pub format: SurfaceFormat,
+    pub format: OutputFormat,
     /// Whether the source's own vertices are carried along as well.
     pub carry: bool,
     /// Pieces with less than this share of a surface's area are left out.
@@ -36,7 +36,7 @@ impl ExtractOptions {
         Self {
             times: even_times(recipe.result.frames),
             resolution: recipe.result.resolution,
-            format: SurfaceFormat::Ply,
+            format: OutputFormat::Frames(SurfaceFormat::Ply),
             carry: false,
             smallest_component: recipe.result.smallest_component,
             folder: None,
@@ -68,16 +68,24 @@ impl Trained {
         mut on_event: impl FnMut(&Event),
     ) -> Result<PathBuf> {
         let mut log = RunLog::open(self.folder().path(), Some(usize::MAX))?;
-        self.extract_into(options, stop, &mut log, &mut on_event)
+        self.extract_into(options, stop, &mut log, &mut on_event)?;
+        Ok(self.output(options).join("frames.json"))
     }
 
+    /// Where the files go.
+    fn output(&self, options: &ExtractOptions) -> PathBuf {
+        let folder = options.folder.clone();
+        folder.unwrap_or_else(|| self.folder().meshes())
+    }
+
+    /// Writes surfaces and returns them.
     pub(super) fn extract_into(
         &self,
         options: &ExtractOptions,
         stop: &StopFlag,
         log: &mut RunLog,
         on_event: &mut dyn FnMut(&Event),
-    ) -> Result<PathBuf> {
+    ) -> Result<Vec<Frame>> {
         options
             .times
             .iter()
@@ -88,7 +96,6 @@ impl Trained {
                 options.smallest_component
             )));
         }
-        let folder = options.folder.clone();
         let frame_options = FrameOptions {
             times: options.times.clone(),
             resolution: options.resolution,
@@ -97,7 +104,7 @@ impl Trained {
                 .carry
                 .then(|| self.recipe().data.source().to_owned()),
             smallest_component: options.smallest_component,
-            folder: folder.unwrap_or_else(|| self.folder().meshes()),
+            folder: self.output(options),
         };
         let mut emit = |event: Event| {
             on_event(&event);
@@ -119,7 +126,7 @@ impl Trained {
         }
         emit(Event::Drawing)?;
         show(&frames, &frame_options)?;
-        Ok(frame_options.folder.join("frames.json"))
+        Ok(frames)
     }
 }
 

@@ -5,6 +5,7 @@ use std::io;
 
 use crate::cubes::{ExtractError, GridError};
 use crate::formats::{CarryError, ShapeError, WriteError};
+use crate::gltf::GltfError;
 
 /// Why a frame cannot be written.
 #[derive(Debug, thiserror::Error)]
@@ -32,6 +33,9 @@ pub enum FramesError {
     /// A surface cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
+    /// An animated file cannot be made.
+    #[error(transparent)]
+    Gltf(#[from] GltfError),
     /// `frames.json` cannot be written, or an event cannot be recorded.
     #[error(transparent)]
     Io(#[from] io::Error),

@@ -10,12 +10,33 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use super::animation;
 use super::error::{FramesError, no_motion};
 use super::learned::{Found, Learned};
 use crate::atomic::write_atomically;
 use crate::cubes::Grid;
-use crate::formats::{self, SurfaceFormat, rewrite_vertices, write_surface};
+use crate::formats::{self, Shape, SurfaceFormat, rewrite_vertices, write_surface};
 use crate::geometry::Mesh;
+use crate::gltf::{Precision, Still};
+
+/// The files that surfaces, and carried vertices, are written to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OutputFormat {
+    /// One file for each time: `surface-000.ply` and so on.
+    Frames(SurfaceFormat),
+    /// One animated file for all times: `surface.glb`, and `carried.glb`.
+    Animation(Precision),
+}
+
+impl OutputFormat {
+    /// The file of the surface at the `k`-th time.
+    fn surface(self, k: usize) -> String {
+        match self {
+            Self::Frames(format) => format!("surface-{k:03}.{}", format.extension()),
+            Self::Animation(_) => animation::SURFACE.to_owned(),
+        }
+    }
+}
 
 /// What to write.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,8 +45,8 @@ pub(crate) struct FrameOptions {
     pub times: Vec<f64>,
     /// Cells along the longest side of the box.
     pub resolution: usize,
-    /// The kind of the surface files.
-    pub format: SurfaceFormat,
+    /// The kind of the files.
+    pub format: OutputFormat,
     /// The mesh or cloud whose vertices are carried too, if any.
     pub carry: Option<PathBuf>,
     /// Pieces with less than this share of a surface's area are left out; 0 keeps all.
@@ -105,13 +126,17 @@ pub(crate) fn write_frames(
         None => vec![None; options.times.len()],
     };
     let mut frames = Vec::new();
+    let mut stills = Vec::new();
     for (k, carried) in carried.into_iter().enumerate() {
-        let frame = write_frame(learned, options, &grid, k, carried)?;
+        let frame = write_frame(learned, options, &grid, k, carried, &mut stills)?;
         let go_on = done(&frame)?;
         frames.push(frame);
         if !go_on && frames.len() < options.times.len() {
             return Ok(frames);
         }
+    }
+    if let OutputFormat::Animation(precision) = options.format {
+        animation::write_surfaces(stills, precision, &options.folder)?;
     }
     let entries: Vec<&FrameEntry> = frames.iter().map(|frame| &frame.entry).collect();
     let text = serde_json::to_string_pretty(&entries).map_err(io::Error::other)?;
@@ -140,16 +165,17 @@ fn take_listing(listing: &Path) -> io::Result<Vec<FrameEntry>> {
     Ok(entries)
 }
 
-/// Extracts and writes frame `k`.
+/// Extracts frame `k`, and writes it, or keeps it for the file of all frames.
 fn write_frame(
     learned: &Learned,
     options: &FrameOptions,
     grid: &Grid,
     k: usize,
     carried: Option<String>,
+    stills: &mut Vec<Still>,
 ) -> Result<Frame, FramesError> {
     let time = options.times[k];
-    let surface = format!("surface-{k:03}.{}", options.format.extension());
+    let surface = options.format.surface(k);
     let Found {
         mesh,
         components,
@@ -158,8 +184,18 @@ fn write_frame(
     } = learned.surface_at(grid, time, options.smallest_component, &mut |_| {})?;
     let (normals, slope_error) = learned.normals(&mesh, time);
     let mut placed = mesh.moved(|x| learned.normalisation.invert(x));
-    placed.normals = Some(normals);
-    write_surface(&placed, &options.folder.join(&surface), options.format)?;
+    match options.format {
+        OutputFormat::Frames(format) => {
+            placed.normals = Some(normals);
+            write_surface(&placed, &options.folder.join(&surface), format)?;
+        }
+        OutputFormat::Animation(_) => stills.push(Still {
+            time,
+            vertices: placed.vertices,
+            normals,
+            triangles: placed.triangles,
+        }),
+    }
     let agreement = learned.agreement(&mesh.vertices, time)?;
     let entry = FrameEntry {
         time,
@@ -178,35 +214,54 @@ fn write_frame(
     })
 }
 
-/// Carries the vertices of a shape through all times and writes a file for each; their names.
+/// Carries the vertices of a shape through all times and writes them; the name of the file for each time.
 fn carry(
     learned: &Learned,
     source: &Path,
     options: &FrameOptions,
 ) -> Result<Vec<Option<String>>, FramesError> {
     let shape = formats::read(source)?;
-    let vertices = &shape.mesh.vertices;
-    let start: Vec<[f32; 3]> = vertices
-        .iter()
-        .map(|x| learned.normalisation.apply(*x))
-        .collect();
+    let mut order: Vec<usize> = (0..options.times.len()).collect();
+    order.sort_by(|a, b| options.times[*a].total_cmp(&options.times[*b]));
+    let times: Vec<f64> = order.iter().map(|k| options.times[*k]).collect();
+    let path = carried_vertices(learned, &shape, &times)?;
+    if let OutputFormat::Animation(precision) = options.format {
+        animation::write_carried(&shape, &times, path, precision, &options.folder)?;
+        return Ok(vec![Some(animation::CARRIED.to_owned()); times.len()]);
+    }
     let extension = source
         .extension()
         .and_then(|text| text.to_str())
         .unwrap_or("ply");
-    let mut order: Vec<usize> = (0..options.times.len()).collect();
-    order.sort_by(|a, b| options.times[*a].total_cmp(&options.times[*b]));
     let mut names = vec![None; options.times.len()];
-    let times: Vec<f64> = order.iter().map(|k| options.times[*k]).collect();
-    let path = learned.path(&start, &times)?;
-    for (k, now) in order.into_iter().zip(path) {
-        // The displacement is added to the vertex as it was read, so that time 0 gives the input back.
-        let moved: Vec<[f64; 3]> = (vertices.iter().zip(&start).zip(&now))
-            .map(|((vertex, start), now)| learned.normalisation.displaced(*vertex, *start, *now))
-            .collect();
+    for (k, moved) in order.into_iter().zip(path) {
         let name = format!("carried-{k:03}.{extension}");
         rewrite_vertices(source, &moved, &options.folder.join(&name))?;
         names[k] = Some(name);
     }
     Ok(names)
+}
+
+/// The vertices of a shape at each of `times`, which ascend, in the coordinates of the shape.
+///
+/// # Errors
+/// [`FramesError::NoMotion`].
+pub(crate) fn carried_vertices(
+    learned: &Learned,
+    shape: &Shape,
+    times: &[f64],
+) -> Result<Vec<Vec<[f64; 3]>>, FramesError> {
+    let vertices = &shape.mesh.vertices;
+    let start: Vec<[f32; 3]> = vertices
+        .iter()
+        .map(|x| learned.normalisation.apply(*x))
+        .collect();
+    let path = learned.path(&start, times)?;
+    // The displacement is added to the vertex as it was read, so that time 0 gives the input back.
+    let placed = |now: Vec<[f32; 3]>| {
+        (vertices.iter().zip(&start).zip(&now))
+            .map(|((vertex, start), now)| learned.normalisation.displaced(*vertex, *start, *now))
+            .collect()
+    };
+    Ok(path.into_iter().map(placed).collect())
 }

@@ -6,11 +6,13 @@
 //! | `flow_map.rs` | a field that a flow carries, the flow followed at few points |
 //! | `agreement.rs` | whether a method's surfaces and its motion say the same |
 //! | `frames.rs` | the surfaces of chosen times, as files |
+//! | `animation.rs` | the same as animated files, one for all times |
 //! | `error.rs` | why a surface cannot be had |
 //!
 //! The zero set itself is found in [`crate::cubes`], files are written by [`crate::formats`].
 
 mod agreement;
+mod animation;
 mod error;
 mod flow_map;
 pub(crate) mod frames;
