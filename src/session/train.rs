@@ -16,9 +16,10 @@ use crate::atomic::write_atomically;
 use crate::backend::Backend;
 use crate::error::{Error, Result};
 use crate::event::Event;
-use crate::formats::Shape;
+use crate::formats::{Shape, SurfaceFormat};
 use crate::recipe::Recipe;
 use crate::session::extract::ExtractOptions;
+use crate::surface::frames::OutputFormat;
 
 /// A run that is about to be trained: a recipe, its shapes, a folder and a backend.
 ///
@@ -61,6 +62,23 @@ pub struct Session {
     start: Start,
     engine: Box<dyn Engine>,
     stop: StopFlag,
+    output: Output,
+}
+
+/// What is written of the surfaces at the end of training.
+#[derive(Clone, Copy)]
+struct Output {
+    format: OutputFormat,
+    carry: bool,
+}
+
+impl Default for Output {
+    fn default() -> Self {
+        Self {
+            format: OutputFormat::Frames(SurfaceFormat::Ply),
+            carry: false,
+        }
+    }
 }
 
 /// Where training begins.
@@ -95,6 +113,7 @@ impl Session {
             folder: folder.as_ref().to_path_buf(),
             start: Start::New { replace: false },
             stop: StopFlag::default(),
+            output: Output::default(),
         })
     }
 
@@ -124,6 +143,7 @@ impl Session {
                 notes,
             },
             stop: StopFlag::default(),
+            output: Output::default(),
         })
     }
 
@@ -139,6 +159,14 @@ impl Session {
     /// The flag that stops the training after its present step, with a checkpoint.
     pub fn stop_flag(&self) -> StopFlag {
         self.stop.clone()
+    }
+
+    /// The files of the surfaces at the end of training, PLY without this; with `carry` the source is carried
+    /// along as well.
+    #[must_use]
+    pub fn writing(mut self, format: OutputFormat, carry: bool) -> Self {
+        self.output = Output { format, carry };
+        self
     }
 
     /// Ends early when this flag is set, instead of one of its own.
@@ -198,7 +226,12 @@ impl Session {
         let learned = learned::learned(deformation, &self.recipe, begun.frame)?;
         let trained = Trained::new(learned, self.recipe.clone(), begun.run);
         if self.recipe.result.frames > 0 {
-            let options = ExtractOptions::of(&self.recipe);
+            let Output { format, carry } = self.output;
+            let options = ExtractOptions {
+                format,
+                carry,
+                ..ExtractOptions::of(&self.recipe)
+            };
             trained.extract_into(&options, &self.stop, log, on_event)?;
         }
         Ok(trained)

@@ -282,3 +282,28 @@ fn every_key_that_it_names_acts() {
         assert!(outcome(&[change]) != plain, "{change}: nothing changed");
     }
 }
+
+#[test]
+fn the_guide_of_networks_is_the_field_of_the_preset() {
+    let keyframes = keyframes(0.6);
+    let mut network = Recipe::between("a.ply", "b.ply").expect("two files");
+    let changes = ["preset=quick", "loss.strain=4", "training.seed=7"].map(str::to_owned);
+    network.with_all(&changes).expect("a recipe");
+    let guide = guide(&network, &keyframes).expect("a field");
+    let solved = trained(
+        &recipe(&[
+            "training.steps=18",
+            "spline.band=24000",
+            "loss.strain=4",
+            "training.seed=7",
+        ]),
+        &keyframes,
+    );
+    let places = crate::geometry::testing::random_places(50, 0.5, 3);
+    let times = vec![0.3; places.len()];
+    let expected = solved.field().values(&places, 0.3);
+    assert_eq!(guide.velocities(&places, &times), expected);
+    assert!(!is_guided(&network, 0));
+    network.with("training.guided-until=0.5").expect("a recipe");
+    assert!(is_guided(&network, 499) && !is_guided(&network, 500));
+}

@@ -28,7 +28,7 @@ const ALL_ON: [&str; 15] = [
 ];
 
 /// Another value of each key of the sections that methods share, and what that needs.
-const OTHER: [(&str, &[&str]); 58] = [
+const OTHER: [(&str, &[&str]); 59] = [
     ("implicit.depth=3", &[]),
     ("implicit.width=9", &[]),
     ("implicit.activation=sine", &[]),
@@ -81,6 +81,7 @@ const OTHER: [(&str, &[&str]); 58] = [
         "training.final-learning-rate=0.5",
         &["training.schedule=cosine"],
     ),
+    ("training.guided-until=0.25", &[]),
     ("training.warm-up=0", &[]),
     ("training.ramp-until=0.75", &[]),
     ("training.velocity-until=1", &[]),

@@ -1,6 +1,7 @@
 //! Methods on small spheres: their samples, what each trains, which keys act.
 
 mod acting;
+mod guided;
 mod methods;
 mod optimiser;
 mod samples;
@@ -80,9 +81,12 @@ fn recipe_of(spec: &MethodSpec, extra: &[&str]) -> Recipe {
     recipe(&own.chain(extra.iter().copied()).collect::<Vec<_>>())
 }
 
-/// Points of two spheres, the second moved along x.
+/// Points of two spheres, the second moved along x, with a guide.
 fn data() -> TrainingData {
-    TrainingData::spheres(200, 200)
+    TrainingData {
+        guide: Some(Box::new(guided::Turning)),
+        ..TrainingData::spheres(200, 200)
+    }
 }
 
 fn build(recipe: &Recipe, data: &TrainingData) -> Box<dyn Method<B>> {
