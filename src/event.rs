@@ -128,6 +128,11 @@ pub enum Event {
         /// Whether the box that was searched cuts it off.
         touches_box: bool,
     },
+    /// The page that shows the run lies on the disk.
+    Reported {
+        /// Its file.
+        path: PathBuf,
+    },
     /// Frames are being measured against the ground truth.
     Measuring {
         /// Frames done; none while the best times are found.

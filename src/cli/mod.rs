@@ -21,6 +21,7 @@ mod normals;
 mod resume;
 mod terminal;
 mod train;
+mod view;
 
 use std::io::{self, Write};
 use std::process::ExitCode;
@@ -37,7 +38,8 @@ use terminal::Terminal;
     name = "isomorph",
     version,
     after_help = "First steps:\n  \
-        isomorph train data/fox/quick.toml       train on a sample and look at runs/fox-quick/meshes\n  \
+        isomorph train data/fox/quick.toml       train on a sample\n  \
+        isomorph view runs/fox-quick             look at it in the browser\n  \
         isomorph init a.ply b.ply > pair.toml    write a recipe for two shapes of your own\n  \
         isomorph extract runs/fox-quick --frames 25 --carry"
 )]
@@ -50,6 +52,7 @@ pub(crate) struct Cli {
 enum Command {
     Train(train::TrainArgs),
     Resume(resume::ResumeArgs),
+    View(view::ViewArgs),
     Extract(extract::ExtractArgs),
     Evaluate(evaluate::EvaluateArgs),
     Compare(compare::CompareArgs),
@@ -160,6 +163,7 @@ pub(crate) fn run(cli: Cli) -> ExitCode {
     let ended = match cli.command {
         Command::Train(args) => train::run(args),
         Command::Resume(args) => resume::run(args),
+        Command::View(args) => view::run(args),
         Command::Extract(args) => extract::run(args),
         Command::Evaluate(args) => evaluate::run(args),
         Command::Compare(args) => compare::run(args),
