@@ -5,7 +5,8 @@ use std::time::SystemTime;
 
 use super::extract::even_times;
 use super::folder::RunFolder;
-use super::report_data::{ReportData, TrueShapes};
+use super::report_data::ReportData;
+use super::report_truth::TrueShapes;
 use super::trained::Trained;
 use crate::atomic::write_atomically;
 use crate::cubes::Grid;

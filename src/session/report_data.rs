@@ -1,16 +1,15 @@
 //! What the page of a run shows, gathered: surfaces over time, the source that the motion carries, pairs, measures.
 
-use std::collections::{BTreeMap, BTreeSet};
-
 use isomorph_training::method::spec_of;
 
-use super::metrics::Metrics;
+use super::extract::even_times;
 use super::prepare;
+use super::report_log::{notes_of, series};
+use super::report_truth::TrueShapes;
 use super::trained::Trained;
 use crate::error::Result;
-use crate::evaluate::{GroundTruth, Span};
 use crate::formats::Shape;
-use crate::geometry::{Bounds, Mesh, TriangleSearch};
+use crate::geometry::{Bounds, Mesh, NeighbourSearch};
 use crate::recipe;
 use crate::shape::Correspondences;
 use crate::surface::frames::Frame;
@@ -30,58 +29,10 @@ const SURFACE_BYTES: usize = 1_800_000;
 const SURFACE_VERTICES: [usize; 2] = [1000, 8000];
 
 /// Points of a surface whose trust is computed, and which stand for their neighbours.
-const TRUSTED: usize = 3000;
+const TRUSTED: usize = 1500;
 
-/// Pairs, and logged steps, that are shown.
+/// Pairs that are shown.
 const PAIRS: usize = 800;
-const STEPS: usize = 400;
-
-/// The true shape at any time of a run.
-pub(super) struct TrueShapes<'a> {
-    truth: &'a GroundTruth,
-    span: Span,
-}
-
-impl<'a> TrueShapes<'a> {
-    /// # Errors
-    /// Frames that are not the ends of the run.
-    pub(super) fn of(
-        trained: &Trained,
-        truth: &'a GroundTruth,
-        [from, to]: [usize; 2],
-    ) -> Result<Self> {
-        let span = truth.span(from, to)?;
-        let normalisation = &trained.learned().normalisation;
-        let keyframes = prepare::points_only(trained.recipe())?;
-        let [source, target] = [0, 1].map(|k| &keyframes.keys[k].cloud.points);
-        truth.check_ends(span, normalisation, source, target)?;
-        Ok(Self { truth, span })
-    }
-
-    /// The distances of points from the true shape at a time, normalised. Between two true frames their
-    /// vertices are interpolated.
-    fn distances(&self, learned: &Learned, points: &[[f32; 3]], time: f64) -> Option<Vec<f32>> {
-        let (from, to) = (self.span.from(), self.span.to());
-        let at = from as f64 + time * (to - from) as f64;
-        let before = (at.floor() as usize).min(to - 1);
-        let share = at - before as f64;
-        let [a, b] = [before, before + 1].map(|frame| self.truth.vertices(frame));
-        let between = |(a, b): (&[f64; 3], &[f64; 3])| {
-            let x = [0, 1, 2].map(|k| a[k] + share * (b[k] - a[k]));
-            learned.normalisation.apply(x)
-        };
-        let vertices = a.iter().zip(b).map(between).collect();
-        let mesh: Mesh<f32> = Mesh::new(vertices, self.truth.triangles().to_vec());
-        let search = TriangleSearch::new(&mesh)?;
-        let mut near = 0;
-        let distances = points.iter().map(|x| {
-            let closest = search.closest(*x, near);
-            near = closest.triangle;
-            closest.squared.sqrt()
-        });
-        Some(distances.collect())
-    }
-}
 
 /// What a page shows of a run.
 pub(super) struct ReportData<'a> {
@@ -155,7 +106,7 @@ impl<'a> ReportData<'a> {
                             .apply(self.shapes[0].mesh.vertices[*k as usize])
                     })
                     .collect();
-                let times = super::extract::even_times(TIMES);
+                let times = even_times(TIMES);
                 self.carried = Some(Track {
                     time: 0.0,
                     frames: self.learned().path(&start, &times)?,
@@ -259,7 +210,7 @@ impl<'a> ReportData<'a> {
         let nearest = match apart {
             1 => (0..points.len()).collect(),
             _ => {
-                let search = crate::geometry::NeighbourSearch::new(&wide(&some));
+                let search = NeighbourSearch::new(&wide(&some));
                 let near = search.nearest_one_of_each(&wide(points)).into_iter();
                 near.map(|found| found.index as usize).collect::<Vec<_>>()
             }
@@ -390,45 +341,6 @@ fn times_around(times: &[f64], k: usize, moves: bool) -> Vec<f64> {
         .collect();
     all.dedup();
     all
-}
-
-/// Each term of the objective over the logged steps, and their sum.
-fn series(metrics: &[Metrics]) -> (Vec<usize>, BTreeMap<String, Vec<Option<f64>>>) {
-    let chosen = thinned_cloud(metrics.len(), STEPS);
-    let some: Vec<&Metrics> = chosen.iter().map(|k| &metrics[*k as usize]).collect();
-    let names: BTreeSet<&String> = some.iter().flat_map(|step| step.terms.keys()).collect();
-    let mut series = BTreeMap::new();
-    for name in names {
-        let value = |step: &&Metrics| step.terms.get(name).and_then(|term| term.weighted);
-        series.insert(name.clone(), some.iter().map(value).collect());
-    }
-    series.insert(
-        "total".to_owned(),
-        some.iter().map(|step| step.total).collect(),
-    );
-    (some.iter().map(|step| step.step).collect(), series)
-}
-
-/// What `run.log` says that somebody should read, each once.
-fn notes_of(trained: &Trained) -> Vec<String> {
-    let text = std::fs::read_to_string(trained.folder().path().join("run.log"));
-    let mut notes: Vec<String> = Vec::new();
-    for line in text.unwrap_or_default().lines() {
-        let Some((_, text)) = line.split_once(' ') else {
-            continue;
-        };
-        let is_warning =
-            text.contains("the box cuts it off") || text.contains("no zero in the box");
-        let note = match text.strip_prefix("note: ") {
-            Some(note) => note,
-            None if is_warning => text,
-            None => continue,
-        };
-        if !notes.iter().any(|known| known == note) {
-            notes.push(note.to_owned());
-        }
-    }
-    notes
 }
 
 /// The box around points.
