@@ -50,7 +50,7 @@ AXES = {
     "resolution": "resolution of the surfaces",
 }
 
-STAGES = ("read files", "points and normals", "exact distances", "steps", "surfaces", "picture")
+STAGES = ("read files", "points and normals", "exact distances", "steps", "surfaces", "picture and page")
 
 
 def arguments(words: list[str]) -> argparse.Namespace:

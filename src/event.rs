@@ -150,6 +150,11 @@ pub enum Event {
     },
     /// All surfaces lie on the disk, and the picture of them is being drawn.
     Drawing,
+    /// The page that shows the run lies on the disk.
+    Reported {
+        /// Its file.
+        path: PathBuf,
+    },
     /// Frames are being measured against the ground truth.
     Measuring {
         /// Frames done; none while the best times are found.

@@ -33,6 +33,7 @@ pub(super) fn line(event: &Event, left: Option<Duration>) -> Option<String> {
         }
         Event::Extracting { frames } => format!("extracting {}", counted(*frames, "surface")),
         Event::Extracted { .. } => return extracted(event),
+        Event::Reported { path } => format!("report: {}", path.display()),
         Event::Interrupted { step } => {
             format!("interrupted after step {step}: the newest checkpoint holds all of it")
         }

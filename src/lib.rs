@@ -50,6 +50,7 @@ mod session;
 mod shape;
 mod solved;
 mod surface;
+mod viewer;
 
 pub use backend::Backend;
 pub use error::{Error, ErrorKind, Result};
@@ -62,6 +63,7 @@ pub use recipe::Recipe;
 pub use session::describe::describe;
 pub use session::extract::{ExtractOptions, even_times};
 pub use session::folder::is_run;
+pub use session::report::current_report;
 pub use session::stop::StopFlag;
 pub use session::trained::{Distances, Surface};
 pub use session::{Session, Trained};

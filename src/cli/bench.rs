@@ -13,7 +13,7 @@ use super::{BackendArgs, Result, print};
 /// Measure a training step, or a whole run of the preset instant: seconds, memory and efficiency
 ///
 /// `--size instant` measures a whole run stage by stage: files, points and normals, exact distances, steps,
-/// surfaces, picture. The shapes are a rod and the same rod bent; `--recipe` takes those of a recipe, with its
+/// surfaces, picture and page. The shapes are a rod and the same rod bent; `--recipe` takes those of a recipe, with its
 /// preset. All other sizes measure a step.
 ///
 /// The shapes are two spheres of points. The step is that of the preset quick or default, or that of the

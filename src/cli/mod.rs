@@ -17,10 +17,12 @@ mod extract;
 mod info;
 mod init;
 mod match_shapes;
+mod morph;
 mod normals;
 mod resume;
 mod terminal;
 mod train;
+mod view;
 
 use std::io::{self, Write};
 use std::process::ExitCode;
@@ -37,7 +39,8 @@ use terminal::Terminal;
     name = "isomorph",
     version,
     after_help = "First steps:\n  \
-        isomorph train data/fox/quick.toml       train on a sample and look at runs/fox-quick/meshes\n  \
+        isomorph train data/fox/quick.toml       train on a sample\n  \
+        isomorph view runs/fox-quick             look at it in the browser\n  \
         isomorph init a.ply b.ply > pair.toml    write a recipe for two shapes of your own\n  \
         isomorph extract runs/fox-quick --frames 25 --carry"
 )]
@@ -48,8 +51,10 @@ pub(crate) struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Morph(morph::MorphArgs),
     Train(train::TrainArgs),
     Resume(resume::ResumeArgs),
+    View(view::ViewArgs),
     Extract(extract::ExtractArgs),
     Evaluate(evaluate::EvaluateArgs),
     Compare(compare::CompareArgs),
@@ -158,8 +163,10 @@ impl Failure {
 /// Runs the command and says how it went.
 pub(crate) fn run(cli: Cli) -> ExitCode {
     let ended = match cli.command {
+        Command::Morph(args) => morph::run(args),
         Command::Train(args) => train::run(args),
         Command::Resume(args) => resume::run(args),
+        Command::View(args) => view::run(args),
         Command::Extract(args) => extract::run(args),
         Command::Evaluate(args) => evaluate::run(args),
         Command::Compare(args) => compare::run(args),

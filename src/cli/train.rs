@@ -3,14 +3,15 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use isomorph::{Recipe, Session, is_run};
+use isomorph::{Event, Recipe, Session, is_run};
 
+use super::view::show;
 use super::{BackendArgs, Failure, QuietArgs, Result, SetArgs, stop_on_interrupt};
 
 /// Train on the two shapes of a recipe, and write surfaces in between
 ///
 /// The run's folder receives the resolved recipe, metrics and checkpoints. At the end it receives surfaces
-/// as PLY files in meshes/, and a picture of them, meshes/preview.png. Ctrl-C finishes the present step and
+/// as PLY files in meshes/, a picture of them, meshes/preview.png, and a page that plays them, report.html. Ctrl-C finishes the present step and
 /// writes a checkpoint. `isomorph resume` goes on from it.
 #[derive(Debug, Args)]
 pub(super) struct TrainArgs {
@@ -20,6 +21,10 @@ pub(super) struct TrainArgs {
     /// Folder of the run [default: runs/FOLDER-NAME of the recipe, such as runs/fox-quick]
     #[arg(long, value_name = "DIR")]
     run: Option<PathBuf>,
+
+    /// Open the page of the run in the browser at the end
+    #[arg(long)]
+    open: bool,
 
     /// Replace an existing run
     #[arg(long)]
@@ -53,7 +58,18 @@ pub(super) fn run(args: TrainArgs) -> Result {
         session
     };
     let mut terminal = args.quiet.terminal(&folder);
-    session.train(|event| terminal.show(event))?;
+    let mut page = None;
+    session.train(|event| {
+        if let Event::Reported { path } = event {
+            page = Some(path.clone());
+        }
+        terminal.show(event);
+    })?;
+    match page.filter(|_| args.open) {
+        Some(page) => show(&page),
+        None if args.open => eprintln!("no page was written: result.frames is 0"),
+        None => {}
+    }
     Ok(())
 }
 

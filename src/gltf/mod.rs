@@ -3,6 +3,7 @@
 //! | file | what it does |
 //! |---|---|
 //! | `builder.rs` | accessors over one buffer, and the container around it |
+//! | `frame.rs` | where the numbers of a file lie in the coordinates of the input |
 //! | `morph.rs` | [`morphing`]: one mesh whose vertices move, as morph targets |
 //! | `sequence.rs` | [`in_turn`]: one mesh for each time, shown in turn |
 //!
@@ -13,6 +14,7 @@
 //! Time 0 to 1 becomes [`SECONDS`] seconds of animation.
 
 mod builder;
+mod frame;
 mod morph;
 mod sequence;
 #[cfg(test)]

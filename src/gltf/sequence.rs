@@ -6,7 +6,8 @@ use serde_json::{Value, json};
 
 use super::SECONDS;
 use super::builder::{Builder, GltfError, Precision};
-use super::morph::{Frame, directed, require_quantised, surface};
+use super::frame::Frame;
+use super::morph::{directed, require_quantised, surface};
 
 /// A mesh at one time.
 pub(crate) struct Still {

@@ -161,7 +161,7 @@ impl Clock {
             Event::Preparing(Preparation::Distances) => self.begin("exact distances"),
             Event::Started { .. } => self.begin("steps"),
             Event::Extracting { .. } => self.begin("surfaces"),
-            Event::Drawing => self.begin("picture"),
+            Event::Drawing => self.begin("picture and page"),
             _ => {}
         }
     }

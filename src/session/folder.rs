@@ -1,7 +1,7 @@
 //! The folder of one run: where everything lies in it, and how it is created without harm to another.
 //!
 //! ```text
-//! recipe.toml  pairs.csv (where they were to be found)  metrics.jsonl  run.log  checkpoints/  meshes/
+//! recipe.toml  pairs.csv (where they were to be found)  metrics.jsonl  run.log  checkpoints/  meshes/  report.html
 //! ```
 
 use std::fs;
@@ -132,6 +132,11 @@ impl RunFolder {
         self.0.join("meshes")
     }
 
+    /// The page that shows the run.
+    pub(crate) fn report(&self) -> PathBuf {
+        self.0.join("report.html")
+    }
+
     /// Deletes what a run is made of, and nothing else.
     fn clear(&self) -> io::Result<()> {
         for folder in [self.checkpoints(), self.meshes()] {
@@ -139,7 +144,7 @@ impl RunFolder {
                 fs::remove_dir_all(folder)?;
             }
         }
-        let files = ["metrics.jsonl", "run.log", "pairs.csv"];
+        let files = ["metrics.jsonl", "run.log", "pairs.csv", "report.html"];
         // The recipe last: without it this is no run that another try may replace.
         for file in files.into_iter().chain(["recipe.toml"]) {
             match fs::remove_file(self.0.join(file)) {

@@ -6,6 +6,7 @@
 //! | `train.rs` | [`Session`]: a run from its recipe, or from its newest checkpoint |
 //! | `trained.rs` | [`Trained`]: a run that is opened, and what can be asked of it |
 //! | `extract.rs` | the surfaces of a run as files, with a picture of them |
+//! | `report.rs`, `report_data.rs`, `report_log.rs`, `report_truth.rs` | the page of a run, `report.html` |
 //! | `evaluate.rs`, `measure.rs` | a run held against the true frames between its key frames |
 //! | `compare.rs`, `compared.rs` | methods side by side on pairs of frames |
 //! | `pairs.rs`, `normals.rs` | correspondences and normals found from shapes alone |
@@ -38,6 +39,10 @@ mod morph_size;
 pub(crate) mod normals;
 pub(crate) mod pairs;
 mod prepare;
+pub(crate) mod report;
+mod report_data;
+mod report_log;
+mod report_truth;
 pub(crate) mod stop;
 pub(crate) mod train;
 pub(crate) mod trained;

@@ -232,7 +232,14 @@ impl Session {
                 carry,
                 ..ExtractOptions::of(&self.recipe)
             };
-            trained.extract_into(&options, &self.stop, log, on_event)?;
+            let frames = trained.extract_into(&options, &self.stop, log, on_event)?;
+            let event = match trained.write_report(frames, None) {
+                Ok(path) => Event::Reported { path },
+                // All that was trained is there; the page can be made again.
+                Err(reason) => Event::Note(format!("no report.html was written: {reason}")),
+            };
+            on_event(&event);
+            log.record(&event)?;
         }
         Ok(trained)
     }

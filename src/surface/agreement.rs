@@ -1,7 +1,5 @@
 //! Whether a method's surfaces and its motion say the same of the shape.
 
-use isomorph_training::deformation::SurfaceField;
-
 use super::error::FramesError;
 use super::learned::{Learned, some_of};
 
@@ -19,6 +17,15 @@ pub(crate) struct Agreement {
     pub round_trip: f64,
 }
 
+/// The same of each point.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct PointAgreement {
+    /// The mean of `|f(phi_{t -> s}(x), s)|` over both ends.
+    pub consistency: Vec<f32>,
+    /// The mean distance from where the point comes back to, over both ends.
+    pub round_trip: Vec<f32>,
+}
+
 impl Learned {
     /// Of the surface at `time`, whose vertices these are; `None` where the method has no field or moves no
     /// points, or the surface is empty.
@@ -27,42 +34,55 @@ impl Learned {
         vertices: &[[f32; 3]],
         time: f64,
     ) -> Result<Option<Agreement>, FramesError> {
+        if vertices.is_empty() {
+            return Ok(None);
+        }
+        let some = some_of(vertices, LOOKED_AT);
+        let mean = |values: &[f32]| {
+            let sum: f64 = values.iter().map(|value| f64::from(*value)).sum();
+            sum / values.len() as f64
+        };
+        let found = self.agreement_of_each(&some, time)?;
+        Ok(found.map(|found| Agreement {
+            consistency: mean(&found.consistency),
+            round_trip: mean(&found.round_trip),
+        }))
+    }
+
+    /// Of each of these points of the surface at `time`; `None` where the method has no field or moves no
+    /// points.
+    pub(crate) fn agreement_of_each(
+        &self,
+        points: &[[f32; 3]],
+        time: f64,
+    ) -> Result<Option<PointAgreement>, FramesError> {
         let Some(field) = self.deformation.field() else {
             return Ok(None);
         };
-        if self.deformation.motion().is_none() || vertices.is_empty() {
+        if self.deformation.motion().is_none() {
             return Ok(None);
         }
-        let start = some_of(vertices, LOOKED_AT);
-        let (mut off, mut missed) = (0.0, 0.0);
+        let mut found = PointAgreement {
+            consistency: vec![0.0; points.len()],
+            round_trip: vec![0.0; points.len()],
+        };
         for end in [0.0, 1.0] {
-            let there = self.carry(&start, time, end)?;
-            off += mean_distance(field, &there, end);
+            let there = self.carry(points, time, end)?;
+            let off = field.values(&there, end);
             let back = self.carry(&there, end, time)?;
-            let apart = |(a, b): (&[f32; 3], &[f32; 3])| {
-                let squares = a.iter().zip(b).map(|(a, b)| f64::from(a - b).powi(2));
-                squares.sum::<f64>().sqrt()
-            };
-            missed += start.iter().zip(&back).map(apart).sum::<f64>();
+            for (k, (x, y)) in points.iter().zip(&back).enumerate() {
+                let squares = x.iter().zip(y).map(|(a, b)| f64::from(a - b).powi(2));
+                found.round_trip[k] += (squares.sum::<f64>().sqrt() / 2.0) as f32;
+                found.consistency[k] += off[k].abs() / 2.0;
+            }
         }
-        let count = 2.0 * start.len() as f64;
-        Ok(Some(Agreement {
-            consistency: off / 2.0,
-            round_trip: missed / count,
-        }))
+        Ok(Some(found))
     }
-}
-
-/// The mean of `|f(., time)|`.
-fn mean_distance(field: &dyn SurfaceField, points: &[[f32; 3]], time: f64) -> f64 {
-    let values = field.values(points, time);
-    let sum: f64 = values.iter().map(|value| f64::from(value.abs())).sum();
-    sum / points.len() as f64
 }
 
 #[cfg(test)]
 mod tests {
-    use isomorph_training::deformation::PointMotion;
+    use isomorph_training::deformation::{PointMotion, SurfaceField};
 
     use super::*;
     use crate::surface::learned::testing::Given;

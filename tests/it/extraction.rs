@@ -1,11 +1,14 @@
 //! `extract`: surfaces in another format and place, and the input's own vertices carried along.
 
 use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
 
 use crate::support::mesh::Mesh;
 use crate::support::ply::{self, Ply};
 use crate::support::run::frames;
-use crate::support::workplace::{Workplace, turn};
+use crate::support::workplace::{Workplace, names, turn};
 
 /// A few steps: what is extracted is then near the sphere that the fields start from, and a surface like any
 /// other.
@@ -150,4 +153,72 @@ fn a_carried_obj_keeps_every_line_but_those_of_its_vertices() {
         "hardly a vertex moves"
     );
     assert_eq!(carried.lines().count(), text.lines().count());
+}
+
+#[test]
+fn an_animation_is_one_file_for_all_times_and_takes_the_place_of_the_others() {
+    let _turn = turn();
+    let place = Workplace::tiny(KEYS);
+    place.train("run", &[]);
+    let extract = [
+        "extract",
+        "run",
+        "--quiet",
+        "--resolution",
+        "32",
+        "-o",
+        "out",
+    ];
+    let times = ["--times", "0,0.25,1", "--carry"];
+    place.isomorph(&[&extract[..], &times].concat()).succeeded();
+    let glb = ["--format", "glb"];
+    place
+        .isomorph(&[&extract[..], &times, &glb].concat())
+        .succeeded();
+    let left = ["carried.glb", "frames.json", "preview.png", "surface.glb"];
+    assert_eq!(names(&place.path("out")), left, "no file of before");
+    for frame in frames(&place.path("out")) {
+        assert!(frame.surface.ends_with("surface.glb"), "{frame:?}");
+        assert!(
+            frame
+                .carried
+                .is_some_and(|file| file.ends_with("carried.glb"))
+        );
+    }
+    let carried = described(&place.path("out/carried.glb"));
+    let primitive = &carried["meshes"][0]["primitives"][0];
+    assert_eq!(primitive["targets"].as_array().map(Vec::len), Some(2));
+    let count = |accessor: &Value| {
+        let index = accessor.as_u64().expect("an accessor") as usize;
+        carried["accessors"][index]["count"].as_u64()
+    };
+    let sphere = Mesh::sphere(1.0, 3);
+    let vertices = Some(sphere.vertices.len() as u64);
+    assert_eq!(count(&primitive["attributes"]["POSITION"]), vertices);
+    assert_eq!(
+        count(&primitive["indices"]),
+        Some(3 * sphere.triangles.len() as u64)
+    );
+    let surfaces = described(&place.path("out/surface.glb"));
+    assert_eq!(surfaces["meshes"].as_array().map(Vec::len), Some(3));
+    let full = fs::metadata(place.path("out/surface.glb"))
+        .expect("a file")
+        .len();
+    place
+        .isomorph(&[&extract[..], &times, &glb, &["--compact"]].concat())
+        .succeeded();
+    let compact = fs::metadata(place.path("out/surface.glb"))
+        .expect("a file")
+        .len();
+    assert!(compact < full * 3 / 4, "{compact} of {full} bytes");
+    let ended = place.isomorph(&[&extract[..], &["--compact"]].concat());
+    ended.refused(2, &["--compact", "--format glb"]);
+}
+
+/// The JSON of a GLB file.
+fn described(path: &Path) -> Value {
+    let bytes = fs::read(path).expect("a file");
+    assert_eq!((&bytes[..4], &bytes[16..20]), (&b"glTF"[..], &b"JSON"[..]));
+    let length = u32::from_le_bytes(bytes[12..16].try_into().expect("four bytes")) as usize;
+    serde_json::from_slice(&bytes[20..20 + length]).expect("JSON")
 }

@@ -27,3 +27,4 @@ mod paper;
 mod resume;
 mod samples;
 mod support;
+mod viewing;

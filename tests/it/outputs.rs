@@ -39,6 +39,7 @@ fn training_leaves_a_whole_run_and_nothing_else() {
         "meshes",
         "metrics.jsonl",
         "recipe.toml",
+        "report.html",
         "run.log",
     ];
     assert_eq!(names(&run.0), wanted);
