@@ -74,7 +74,7 @@ pub(super) static EFIS: MethodSpec = MethodSpec {
         ("efis.width", "a trained network cannot change its shape"),
         ("training.steps", SHARED_OUT),
     ],
-    // Its sines are fast: at 1e-3 the flow folds space within ten steps.
+    // Its sines are fast: at 1e-3 the isometry term grows without bound within ten steps.
     changes: &["training.velocity-learning-rate=2e-4"],
 };
 

@@ -108,8 +108,7 @@ pub fn objective<B: ModelBackend>(
             .float();
         let there = flow.between(x, s.clone(), -s + 1.0);
         let odds = fields.of_the_other(there, half).value * SHARPNESS;
-        // log(1 + exp(z)) - y z, which is the cross entropy of y and of the logistic function of z.
-        (Activation::Softplus { beta: 1.0 }.value(odds.clone()) - outside * odds).mean()
+        cross_entropy(odds, outside)
     });
     if weights.speed > 0.0 || weights.isometry > 0.0 || weights.volume > 0.0 {
         let there = flow.forward_jet_with_rate(start, samples.times.clone());
@@ -130,6 +129,13 @@ pub fn objective<B: ModelBackend>(
         });
     }
     objective
+}
+
+/// `mean log(1 + exp(z)) - y z`, the cross entropy of `y` (0 or 1) and of the logistic function of `z`, `[1]`.
+fn cross_entropy<B: ModelBackend>(z: Tensor<B, 2>, y: Tensor<B, 2>) -> Tensor<B, 1> {
+    let softplus = Activation::Softplus { beta: 1.0 };
+    let none = Tensor::zeros([1, 1], &z.device());
+    (softplus.value_and_slope(z.clone(), none).0 - y * z).mean()
 }
 
 /// `mean |J J^T - I|^2`, the squares of all nine entries added, `[1]`.
