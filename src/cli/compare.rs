@@ -8,7 +8,7 @@ use isomorph::comparison::{CompareOptions, command_line, compare, table};
 use super::evaluate::PrecisionArgs;
 use super::{BackendArgs, QuietArgs, Result, SetArgs, print, stop_on_interrupt};
 
-/// Compare methods on pairs of frames of a sequence, in one table and one figure
+/// Compare methods on pairs of frames of a sequence, in one table and two figures
 ///
 /// Each method is given the two frames of a pair and 1000 correspondences. It is measured on the frames
 /// between. Methods of isomorph are the presets instant, quick, default, quality and paper. Other methods are mlp,

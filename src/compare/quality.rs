@@ -18,7 +18,7 @@ struct Quantity {
 const QUANTITIES: [Quantity; 2] = [
     Quantity {
         title: "carried vertices",
-        label: "RMS error of vertices ×10² (normalised units)",
+        label: "RMS error ×10² (normalised units)",
         of_method: |mean| vertices(mean.carried.as_ref()?),
         of_lines: |mean| vertices(&mean.linear),
     },
