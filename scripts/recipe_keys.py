@@ -13,7 +13,7 @@ SOURCE = Path(__file__).resolve().parents[1] / "src"
 GEOMETRIES = {"quick": "flow", "default": "flow", "quality": "flow", "paper": "network"}
 NETWORK_ONLY = ("level-set", "level-set-form", "lambda-l", "transported-normals")
 FLOW_ONLY = ("distance",)
-BASELINES = ("mlp", "sdf-blend", "lipmlp", "nise", "nise-velocity", "eigenbasis", "nfgp")
+BASELINES = ("mlp", "sdf-blend", "lipmlp", "nise", "nise-velocity", "eigenbasis", "nfgp", "efis")
 # What these fit to their shapes; all other terms are of a method with a velocity field.
 BASELINE_LOSSES = ("data", "normals", "eikonal", "off-surface", "distance")
 MOVING = ("eigenbasis", "nfgp")

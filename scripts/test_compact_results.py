@@ -16,6 +16,7 @@ import as_rigid
 import compact_results
 import fake_isomorph
 import matching
+import peers
 import protocol
 import scaling
 from isomorph_paper import PaperError, compact, report, runs
@@ -209,7 +210,7 @@ class Kept(unittest.TestCase):
         if "experiment" in content:
             measured = runs.measured([], compact.unpack(content))
             return report.markdown(content["experiment"], content, measured)
-        makers = {"as-rigid": as_rigid, "matching": matching, "scaling": scaling}
+        makers = {"as-rigid": as_rigid, "matching": matching, "peers": peers, "scaling": scaling}
         return makers.get(path.parent.name, protocol).markdown(content)
 
     def test_each_table_is_that_of_its_numbers(self):

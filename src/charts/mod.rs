@@ -1,22 +1,26 @@
-//! Panels of lines as one SVG: title above, three panels to a row, one legend beside them.
+//! Panels of lines and points as one SVG: title above, three panels to a row, one legend beside them.
 //!
 //! | file | what it holds |
 //! |---|---|
 //! | `axis.rs` | linear and logarithmic axes and their ticks |
-//! | `look.rs` | colours, dashes and marks of lines |
+//! | `look.rs` | colours and dashes of lines |
+//! | `marks.rs` | single points with their labels beside them |
 //! | `svg.rs` | the elements of the drawing |
 //!
 //! The SVG uses whatever sans-serif font the viewer has. Lengths are in pixels.
 
 mod axis;
 mod look;
+mod marks;
 mod svg;
 
 pub(crate) use axis::Scale;
 pub(crate) use look::Stroke;
+pub(crate) use marks::Mark;
 
 use axis::Axis;
 use look::Look;
+use marks::Area;
 use svg::{Anchor, TEXT, path, text, text_width};
 
 /// Panels in a row.
@@ -59,12 +63,16 @@ pub(crate) struct Panel {
     pub x_label: String,
     /// Quantity and unit of y.
     pub y_label: String,
-    /// The range of x, from less to more; that of the points without it.
+    /// The range of x on a linear axis, from less to more; that of the points without it.
     pub x_range: Option<[f64; 2]>,
+    /// How x is laid out.
+    pub x_scale: Scale,
     /// How y is laid out.
     pub y_scale: Scale,
     /// The lines, later ones above earlier ones.
     pub lines: Vec<Line>,
+    /// Points that are named where they lie, above the lines.
+    pub marks: Vec<Mark>,
 }
 
 /// A line through points in the order given.
@@ -118,6 +126,7 @@ pub(crate) fn line_chart(title: &str, panels: &[Panel]) -> Result<String, ChartE
         };
         body += &plot.axes(panel);
         body += &plot.lines(panel, &looks);
+        body += &plot.marks(panel);
     }
     Ok(svg::document(width, height, &body))
 }
@@ -139,13 +148,16 @@ fn axes(panel: &Panel, panels: &[Panel]) -> Option<(Axis, Axis)> {
     let drawn = |panel: &Panel| -> Vec<(f64, f64)> {
         let lines = panel.lines.iter();
         lines
-            .flat_map(|line| places(line, panel.y_scale))
+            .flat_map(|line| places(line, panel))
+            .chain(panel.marks.iter().map(|mark| place(&mark.at, panel)))
             .flatten()
             .collect()
     };
-    let own = Axis::around(Scale::Linear, drawn(panel).into_iter().map(|place| place.0))?;
+    let own = Axis::around(panel.x_scale, drawn(panel).into_iter().map(|place| place.0))?;
     let x = match panel.x_range {
-        Some([start, end]) if start < end => Axis::over(Scale::Linear, start..end),
+        Some([start, end]) if start < end && panel.x_scale == Scale::Linear => {
+            Axis::over(Scale::Linear, start..end)
+        }
         _ => own,
     };
     let quantity = |panel: &Panel| (panel.y_label.clone(), panel.y_scale);
@@ -157,9 +169,13 @@ fn axes(panel: &Panel, panels: &[Panel]) -> Option<(Axis, Axis)> {
 }
 
 /// The places of a line on the axes; `None` where it is broken.
-fn places(line: &Line, scale: Scale) -> impl Iterator<Item = Option<(f64, f64)>> {
-    let place = move |[x, y]: &[f64; 2]| Some((Scale::Linear.place(*x)?, scale.place(*y)?));
-    line.points.iter().map(place)
+fn places(line: &Line, panel: &Panel) -> impl Iterator<Item = Option<(f64, f64)>> {
+    line.points.iter().map(|point| place(point, panel))
+}
+
+/// The place of a point on the axes of a panel; `None` if it has none.
+fn place([x, y]: &[f64; 2], panel: &Panel) -> Option<(f64, f64)> {
+    Some((panel.x_scale.place(*x)?, panel.y_scale.place(*y)?))
 }
 
 /// The axes of a panel and where in the drawing they are.
@@ -210,7 +226,7 @@ impl Plot {
     fn lines(&self, panel: &Panel, looks: &[Look]) -> String {
         let mut drawn = String::new();
         for line in &panel.lines {
-            let places: Vec<_> = places(line, panel.y_scale).collect();
+            let places: Vec<_> = places(line, panel).collect();
             let runs = places.split(Option::is_none);
             let outline: String = runs.map(|run| self.outline(run)).collect();
             let own = looks.iter().filter(|look| look.label == line.label);
@@ -219,13 +235,26 @@ impl Plot {
         svg::clipped((self.left, self.top), (self.width, self.height), &drawn)
     }
 
+    /// The points that are named where they lie.
+    fn marks(&self, panel: &Panel) -> String {
+        let drawn = panel.marks.iter().filter_map(|mark| {
+            let place = place(&mark.at, panel)?;
+            Some((mark.label.as_str(), self.at(&place)))
+        });
+        let (right, bottom) = (self.left + self.width, self.top + self.height);
+        let frame = Area([self.left, self.top, right, bottom]);
+        marks::draw(&drawn.collect::<Vec<_>>(), frame)
+    }
+
+    /// Where a place on the axes is in the drawing.
+    fn at(&self, &(x, y): &(f64, f64)) -> (f64, f64) {
+        let right = self.left + self.x.share(x) * self.width;
+        (right, self.top + (1.0 - self.y.share(y)) * self.height)
+    }
+
     /// The SVG path of an unbroken piece of a line; a point alone becomes a short dash.
     fn outline(&self, run: &[Option<(f64, f64)>]) -> String {
-        let at = |&(x, y): &(f64, f64)| {
-            let right = self.left + self.x.share(x) * self.width;
-            (right, self.top + (1.0 - self.y.share(y)) * self.height)
-        };
-        let points: Vec<_> = run.iter().flatten().map(at).collect();
+        let points: Vec<_> = run.iter().flatten().map(|place| self.at(place)).collect();
         match points[..] {
             [] => String::new(),
             [(x, y)] => format!("M{:.2} {y:.2}h6", x - 3.0),

@@ -3,7 +3,7 @@
 /// Size of ordinary text.
 pub(super) const TEXT: f64 = 14.0;
 /// Where a text lies about its point; it is always centred in its height.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub(super) enum Anchor {
     Start,
     Middle,
@@ -42,6 +42,11 @@ pub(super) fn text((x, y): (f64, f64), anchor: Anchor, size: f64, content: &str)
 /// A thin line.
 pub(super) fn path(through: &str, colour: &str) -> String {
     format!("<path d=\"{through}\" fill=\"none\" stroke=\"{colour}\"/>\n")
+}
+
+/// A filled circle.
+pub(super) fn dot((x, y): (f64, f64), radius: f64) -> String {
+    format!("<circle cx=\"{x:.2}\" cy=\"{y:.2}\" r=\"{radius}\" fill=\"#0072b2\"/>\n")
 }
 
 /// The part of a drawing that lies in a rectangle.

@@ -17,7 +17,7 @@ pub(crate) fn texts(svg: &str) -> Vec<String> {
     anchored(svg, &["start", "middle", "end"])
 }
 
-/// The labels of the legend: they alone start at their point.
+/// The labels of the legend: they alone start at their point, but for those of marks.
 pub(crate) fn legend(svg: &str) -> Vec<String> {
     anchored(svg, &["start"])
 }
@@ -141,6 +141,49 @@ fn a_line_is_broken_where_a_value_has_no_place_on_the_axis() {
         "{outline}"
     );
     assert!(outline.ends_with("h6"), "{outline}");
+}
+
+#[test]
+fn marks_alone_are_drawn_and_named_on_logarithmic_axes() {
+    let mark = |label: &str, at| Mark {
+        label: label.to_owned(),
+        at,
+    };
+    let panel = Panel {
+        x_scale: Scale::Log,
+        y_scale: Scale::Log,
+        marks: vec![
+            mark("fast", [1.0, 4.0]),
+            mark("slow", [100.0, 1.0]),
+            mark("none", [0.0, 1.0]),
+        ],
+        ..panel(vec![])
+    };
+    let svg = line_chart("Marks", &[panel]).expect("a chart");
+    let texts = texts(&svg);
+    let count = |label: &str| texts.iter().filter(|text| *text == label).count();
+    // What has no place on the axis is left out.
+    assert_eq!(
+        [count("fast"), count("slow"), count("none")],
+        [1, 1, 0],
+        "{texts:?}"
+    );
+    let document = roxmltree::Document::parse(&svg).expect("XML");
+    let dots = document
+        .descendants()
+        .filter(|node| node.has_tag_name("circle"));
+    let number = |node: roxmltree::Node<'_, '_>, name: &str| -> f64 {
+        node.attribute(name).expect(name).parse().expect("a number")
+    };
+    let places: Vec<_> = dots
+        .map(|dot| [number(dot, "cx"), number(dot, "cy")])
+        .collect();
+    assert_eq!(places.len(), 2);
+    // Later to the right, larger above.
+    assert!(
+        places[0][0] < places[1][0] && places[0][1] < places[1][1],
+        "{places:?}"
+    );
 }
 
 #[test]

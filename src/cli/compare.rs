@@ -8,11 +8,11 @@ use isomorph::comparison::{CompareOptions, command_line, compare, table};
 use super::evaluate::PrecisionArgs;
 use super::{BackendArgs, QuietArgs, Result, SetArgs, print, stop_on_interrupt};
 
-/// Compare methods on pairs of frames of a sequence, in one table and one figure
+/// Compare methods on pairs of frames of a sequence, in one table and two figures
 ///
 /// Each method is given the two frames of a pair and 1000 correspondences. It is measured on the frames
 /// between. Methods of isomorph are the presets instant, quick, default, quality and paper. Other methods are mlp,
-/// sdf-blend, lipmlp, nise, nise-velocity, eigenbasis and nfgp, with the networks and steps of quick. They
+/// sdf-blend, lipmlp, nise, nise-velocity, eigenbasis, nfgp and efis, with the networks and steps of quick. They
 /// run on the backend flex. Finished runs are reused, so the command can be interrupted and repeated. Every
 /// table has two more rows. `linear` interpolates all true vertices on straight lines. `floor` is the noise
 /// of the samples.

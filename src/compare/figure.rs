@@ -52,6 +52,7 @@ fn panel(plan: &Plan, pair: FramePair, entries: &[Entry]) -> Option<Panel> {
         x_range: Some([0.0, 1.0]),
         y_scale: Scale::Log,
         lines,
+        ..Panel::default()
     })
 }
 

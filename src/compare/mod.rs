@@ -10,6 +10,7 @@
 //! | `comparison.rs` | all results side by side, with their means: `comparison.json` |
 //! | `table.rs`, `columns.rs` | the same as Markdown: `table.md` |
 //! | `figure.rs` | error over time: `error.svg` |
+//! | `quality.rs` | error and time of training: `quality.svg` |
 //!
 //! Arrows run one way: `cli -> compare -> evaluate` (its result types only), `compare -> charts`,
 //! `compare -> atomic`.
@@ -20,6 +21,7 @@ mod digest;
 mod entry;
 mod figure;
 mod plan;
+mod quality;
 mod store;
 mod table;
 #[cfg(test)]
@@ -36,6 +38,7 @@ pub use entry::command_line;
 pub(crate) use entry::{Entry, Machine, Network, Run, now};
 pub(crate) use figure::error_figure;
 pub(crate) use plan::{FramePair, MethodPlan, Plan, PlanError, Request, sequence_name};
+pub(crate) use quality::quality_figure;
 pub(crate) use store::{Lookup, Store, StoreError, file_stem};
 pub use table::table;
 
@@ -45,6 +48,8 @@ pub(crate) const TABLE: &str = "table.md";
 pub(crate) const COMPARISON: &str = "comparison.json";
 /// File of the figure in a sequence's folder.
 pub(crate) const FIGURE: &str = "error.svg";
+/// File of the second figure in a sequence's folder.
+pub(crate) const QUALITY: &str = "quality.svg";
 
 /// Why the results could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -52,13 +57,13 @@ pub enum ReportError {
     /// The file system refused; the message names the file.
     #[error("{0}")]
     Io(#[from] io::Error),
-    /// The figure cannot be drawn.
-    #[error("{FIGURE}: {0}")]
+    /// A figure cannot be drawn.
+    #[error("{FIGURE} or {QUALITY}: {0}")]
     Chart(#[from] ChartError),
 }
 
-/// Writes `table.md`, `comparison.json` and `error.svg` of what is done so far into the store's folder,
-/// each whole, and returns the comparison. With nothing done yet nothing is written.
+/// Writes `table.md`, `comparison.json`, `error.svg` and `quality.svg` of what is done so far into the
+/// store's folder, each whole, and returns the comparison. With nothing done yet nothing is written.
 ///
 /// # Errors
 /// [`ReportError`].
@@ -72,11 +77,12 @@ pub(crate) fn write_report(
         return Ok(comparison);
     }
     let json = serde_json::to_string_pretty(&comparison).map_err(io::Error::from)? + "\n";
-    let files = [
+    let mut files = vec![
         (TABLE, table(&comparison)),
         (COMPARISON, json),
         (FIGURE, error_figure(plan, entries)?),
     ];
+    files.extend(quality_figure(&comparison)?.map(|text| (QUALITY, text)));
     for (name, text) in files {
         write_atomically(&store.folder().join(name), |out| {
             out.write_all(text.as_bytes())
@@ -90,7 +96,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_report_is_three_files_and_the_json_reads_back_as_the_comparison() {
+    fn a_report_is_four_files_and_the_json_reads_back_as_the_comparison() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let store = Store::open(folder.path(), "fox_survey").expect("a store");
         let (plan, entries) = testing::two_pairs_of_three_methods();
@@ -100,7 +106,7 @@ mod tests {
         assert_eq!(back.pairs.len(), comparison.pairs.len());
         assert_eq!(back.mean.len(), 3);
         assert!(read(TABLE).starts_with("# fox_survey"));
-        assert!(read(FIGURE).starts_with("<svg"));
+        assert!(read(FIGURE).starts_with("<svg") && read(QUALITY).starts_with("<svg"));
     }
 
     #[test]

@@ -1,7 +1,8 @@
 //! Methods side by side on the pairs of a sequence, under one budget.
 //!
 //! ```text
-//! RESULTS/fox_survey/            table.md, comparison.json, error.svg, one JSON per pair and method
+//! RESULTS/fox_survey/            table.md, comparison.json, error.svg, quality.svg, one JSON per pair and
+//!                                method
 //! WORK/fox_survey/0-18/          source.ply, target.ply: all that a method sees
 //! WORK/fox_survey/0-18/quick/    its run, as training makes it
 //! ```

@@ -75,7 +75,7 @@ fn what_a_method_lacks_is_told_before_there_is_a_run() {
 #[test]
 fn a_method_that_shares_its_steps_out_keeps_their_number() {
     let _turn = turn();
-    for method in named(&["nise", "nise-velocity", "nfgp"]) {
+    for method in named(&["nise", "nise-velocity", "nfgp", "efis"]) {
         let name = method.name;
         let (place, run) = method.trained();
         let cut = place.run("cut");

@@ -81,7 +81,7 @@ fn two_methods_leave_a_table_a_figure_and_a_file_each() {
     let place = place();
     let ended = compare(&place, &[MLP, EIGENBASIS].concat()).succeeded();
     assert_eq!(place.names(), ["results", "runs", "truth.anime"]);
-    let files = "0-4.eigenbasis.json 0-4.mlp.json comparison.json error.svg table.md";
+    let files = "0-4.eigenbasis.json 0-4.mlp.json comparison.json error.svg quality.svg table.md";
     let folder = place.path("results/truth");
     assert_eq!(names(&folder), with(files, &[]));
     let runs = ["eigenbasis", "mlp", "source.ply", "target.ply"];
@@ -342,7 +342,13 @@ fn a_comparison_that_is_killed_and_interrupted_ends_in_the_same_numbers() {
     let done = names(&place.path("cut/truth"));
     assert_eq!(
         done,
-        ["0-4.mlp.json", "comparison.json", "error.svg", "table.md"]
+        [
+            "0-4.mlp.json",
+            "comparison.json",
+            "error.svg",
+            "quality.svg",
+            "table.md"
+        ]
     );
     let kept = json(&place.path("cut/truth/comparison.json"));
     assert_eq!(

@@ -24,7 +24,7 @@ pub(crate) struct Method {
 }
 
 /// Ours as it ships, the paper's geometry, splines, and every other `method.name`.
-pub(crate) const METHODS: [Method; 10] = [
+pub(crate) const METHODS: [Method; 11] = [
     Method {
         name: "shipped",
         keys: &[],
@@ -70,6 +70,12 @@ pub(crate) const METHODS: [Method; 10] = [
         has_field: false,
         has_motion: true,
     },
+    Method {
+        name: "efis",
+        keys: &["method.name = \"efis\"", "efis.width = 16"],
+        has_field: true,
+        has_motion: true,
+    },
 ];
 
 /// Softplus networks, as comparisons have them.
@@ -89,7 +95,7 @@ const fn at_ends(name: &'static str, keys: &'static [&'static str]) -> Method {
     }
 }
 
-/// Twenty steps: the end fields of `nise` train until step 8, the deformations of `nfgp` take turns of
+/// Twenty steps: the end fields of `nise` and `efis` train until step 8, the deformations of `nfgp` take turns of
 /// five steps each.
 const KEYS: &[&str] = &[
     "data.points = 2000",
@@ -113,6 +119,12 @@ impl Method {
                 "training.correspondence-batch = 40",
             ],
             "spline" | "eigenbasis" => &["training.correspondence-batch = 40"],
+            "efis" => &[
+                "implicit.depth = 3",
+                "implicit.width = 32",
+                "training.batch = 200",
+                "training.correspondence-batch = 40",
+            ],
             "nfgp" => &[
                 "implicit.width = 32",
                 "training.batch = 200",
@@ -318,11 +330,12 @@ fn fields_that_are_fitted_to_points_learn_without_normals_and_correspondences() 
         "sdf-blend",
         "nise",
         "nise-velocity",
+        "efis",
     ];
     for method in named(FITTED) {
         let place = method.place();
         let run = place.train("run", &with(without, &[]));
-        // Between its ends `nise` takes the normals of its own end fields.
+        // Between their ends `nise` and `efis` take the normals of their own end fields.
         let metrics = run.metrics();
         let mut fitted = metrics.iter().filter(|line| line.phase != "between");
         assert!(

@@ -30,7 +30,8 @@ pub enum Activation {
 }
 
 impl Activation {
-    /// `s(z)`.
+    /// `s(z)`, for values only. For gradients there is [`Self::value_and_slope`]: burn's gradient of `log1p` takes a
+    /// reciprocal, and that of burn-ndarray is good to 4e-5 only and depends on where in memory the numbers lie.
     pub fn value<B: Backend>(self, z: Tensor<B, 2>) -> Tensor<B, 2> {
         self.composed(z).0
     }

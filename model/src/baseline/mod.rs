@@ -9,6 +9,7 @@
 //! | [`nise`] | `f(x, t)` under a level-set equation between `g` and `h` | Novello et al. 2023 | surface |
 //! | [`nfgp`] | an invertible deformation that keeps lengths and curvature | Yang et al. 2021 | points |
 //! | [`eigenbasis`] | the flow of a divergence-free field in a sine basis | Eisenberger et al. 2019 | points |
+//! | [`efis`] | an invertible flow of affine couplings between two fields | Buonomo et al. 2026 | surface, points |
 //!
 //! A method that gives a surface implements [`crate::Geometry`], one that moves points [`crate::Motion`].
 //! Each has a configuration (`init`), a burn module, and an [`crate::Objective`] of named terms made from
@@ -16,6 +17,7 @@
 //! the optimiser are made elsewhere.
 
 pub mod blend;
+pub mod efis;
 pub mod eigenbasis;
 pub mod linear;
 pub mod lipmlp;

@@ -15,7 +15,7 @@
 
 pub mod encoding;
 pub mod implicit_net;
-mod initial;
+pub(crate) mod initial;
 pub mod mlp;
 mod renumber;
 pub mod spline_grid;

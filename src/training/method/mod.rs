@@ -9,12 +9,14 @@
 //! | `nise.rs` | `nise`, `nise-velocity` |
 //! | `eigenbasis.rs` | `eigenbasis` |
 //! | `nfgp.rs` | `nfgp` |
+//! | `efis.rs` | `efis` |
 //!
 //! Each file holds all that a method is: its [`MethodSpec`] (name, needs, the keys of the recipe that act,
 //! those that it has alone), and its networks and objective, a [`Method`]. Here stand the only list of
 //! them, [`METHODS`], and what follows from it. The loop, the checkpoints, the surfaces and the evaluation
 //! are the same for all.
 
+mod efis;
 mod eigenbasis;
 mod ends;
 mod flow;
@@ -96,6 +98,7 @@ methods! {
         nise::NISE_VELOCITY => Evolved,
         eigenbasis::EIGENBASIS => SineFlow,
         nfgp::NFGP => Deformations,
+        efis::EFIS => EndsAndCouplings,
     }
 }
 

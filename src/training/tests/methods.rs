@@ -146,6 +146,7 @@ fn the_list_of_methods_has_every_name_and_finds_each_method_again() {
         "nise-velocity",
         "eigenbasis",
         "nfgp",
+        "efis",
     ];
     assert_eq!(names(), wanted);
     for spec in METHODS {

@@ -62,6 +62,7 @@ fn overrides(spec: &MethodSpec) -> Vec<String> {
     let small = match spec.name {
         "eigenbasis" => &["eigenbasis.modes=2"][..],
         "nfgp" => &["nfgp.deformations=2", "nfgp.blocks=1"],
+        "efis" => &["efis.width=8"],
         _ => &[],
     };
     overrides.extend(small.iter().map(|text| (*text).to_owned()));

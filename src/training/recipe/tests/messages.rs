@@ -45,7 +45,7 @@ steps = 5
 preste = 'quick'
     preste: no such key; did you mean preset? (above all sections stands preset)
 lss.data = 5
-    [lss]: no such section; did you mean loss? (a recipe has data, method, spline, lipmlp, nise, eigenbasis, nfgp, implicit, velocity, loss, training, checkpoint, result)
+    [lss]: no such section; did you mean loss? (a recipe has data, method, spline, lipmlp, nise, eigenbasis, nfgp, efis, implicit, velocity, loss, training, checkpoint, result)
 "#;
 
 #[test]
@@ -143,7 +143,7 @@ fn overrides_win_in_their_order_and_name_themselves_when_refused() {
         (
             "results.frames=5",
             "no such section; did you mean result? (a recipe has data, method, spline, lipmlp, nise, \
-             eigenbasis, nfgp, implicit, velocity, loss, training, checkpoint, result)",
+             eigenbasis, nfgp, efis, implicit, velocity, loss, training, checkpoint, result)",
         ),
     ] {
         assert_eq!(message(&text, &[given]), format!("set {given}: {told}"));

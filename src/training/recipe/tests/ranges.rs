@@ -31,6 +31,16 @@ nfgp.blocks                    1        0        32       33
 nfgp.handles                   0        -1e-9    3e38     inf
 nfgp.stretch                   0        -1e-9    3e38     inf
 nfgp.bend                      0        -1e-9    3e38     inf
+efis.ends-until                1e-9     0        0.9      0.91
+efis.omega                     1e-9     0        1000     1000.1
+efis.width                     4        3        4096     4097
+efis.data                      0        -1e-9    3e38     inf
+efis.normals                   0        -1e-9    3e38     inf
+efis.signs                     0        -1e-9    3e38     inf
+efis.speed                     0        -1e-9    3e38     inf
+efis.isometry                  0        -1e-9    3e38     inf
+efis.volume                    0        -1e-9    3e38     inf
+efis.landmarks                 0        -1e-9    3e38     inf
 implicit.depth                 1       0        32       33
 implicit.width                 4       3        4096     4097
 implicit.beta                  1e-9    0        1000     1000.1
@@ -182,7 +192,7 @@ fn every_word_is_admitted_and_no_other() {
         ("data.correspondences", "none same-vertices match pairs.csv"),
         (
             "method.name",
-            "velocity-field mlp sdf-blend lipmlp nise nise-velocity eigenbasis nfgp",
+            "velocity-field mlp sdf-blend lipmlp nise nise-velocity eigenbasis nfgp efis",
         ),
         ("implicit.geometry", "network flow"),
         ("implicit.activation", "softplus sine"),
