@@ -118,18 +118,33 @@ fn written(folder: &Path, page: Option<&Path>) -> String {
     let meshes = folder.join("meshes");
     let named = [
         (page.map(Path::to_path_buf), "look at it in a browser"),
-        (Some(meshes.join("carried.glb")), "your mesh moving, for Blender and the web"),
+        (
+            Some(meshes.join("carried.glb")),
+            "your mesh moving, for Blender and the web",
+        ),
         (Some(meshes.join("surface.glb")), "the surfaces in turn"),
-        (Some(folder.join("recipe.toml")), "repeats this with `isomorph train`"),
+        (
+            Some(folder.join("recipe.toml")),
+            "repeats this with `isomorph train`",
+        ),
     ];
-    let lines = named.into_iter().filter_map(|(path, what)| Some((path?, what)));
+    let lines = named
+        .into_iter()
+        .filter_map(|(path, what)| Some((path?, what)));
     let there = lines.filter(|(path, _)| path.is_file());
-    there.map(|(path, what)| format!("{}  {what}\n", path.display())).collect()
+    there
+        .map(|(path, what)| format!("{}  {what}\n", path.display()))
+        .collect()
 }
 
 /// `runs/` and the names of both files: `scans/a.ply` and `b.ply` go to `runs/a-b`.
 fn default_folder(source: &Path, target: &Path) -> PathBuf {
-    let name = |path: &Path| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let name = |path: &Path| {
+        path.file_stem()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned()
+    };
     Path::new("runs").join(format!("{}-{}", name(source), name(target)))
 }
 

@@ -20,6 +20,7 @@ mod information;
 mod interruption;
 mod matching;
 mod methods;
+mod morphing;
 mod normals;
 mod old_runs;
 mod outputs;
