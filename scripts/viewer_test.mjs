@@ -131,7 +131,7 @@ try {
     await settled(() => page.select('#colour', 'plain'));
   });
   await check('each view differs', async () => {
-    const views = await page.$$eval('#views button', (buttons) => buttons.map(({ id }) => id));
+    const views = await page.$$eval('#views > button', (buttons) => buttons.map(({ id }) => id));
     const seen = new Set();
     for (const id of views) {
       await press(`#${id}`);

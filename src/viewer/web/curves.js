@@ -46,10 +46,10 @@ export function drawCurves(place, { steps, series }) {
   place.replaceChildren(drawing, legend);
 }
 
-/** Three significant digits. */
-export function significant(value) {
+/** So many significant digits. */
+export function significant(value, digits = 3) {
   if (value === null || value === undefined || !Number.isFinite(value)) return 'none';
   if (value === 0) return '0';
   const size = Math.abs(value);
-  return size >= 1e-4 && size < 1e6 ? String(Number(value.toPrecision(3))) : value.toExponential(1);
+  return size >= 1e-4 && size < 1e6 ? String(Number(value.toPrecision(digits))) : value.toExponential(1);
 }

@@ -256,8 +256,11 @@ function start() {
 function results(run) {
   $('subtitle').textContent = run.subtitle;
   const columns = [['time', 't'], ['triangles', 'triangles'], ['components', 'pieces'], ['consistency', 'consistency'], ['round_trip', 'round trip'], ['slope_error', 'slope error'], ['truth', 'to truth']];
-  const used = columns.filter(([name]) => run.quality.some((row) => row[name] !== undefined && row[name] !== null));
-  const cell = (value) => make('td', { textContent: typeof value === 'number' && !Number.isInteger(value) ? significant(value) : value === undefined || value === null ? '–' : value.toLocaleString('en') });
+  const is_said = (row, name) => row[name] !== undefined && row[name] !== null;
+  // Pieces are worth a column where there is more than one.
+  const used = columns.filter(([name]) => run.quality.some((row) => is_said(row, name) && !(name === 'components' && row[name] === 1)));
+  const text = (value) => (value === undefined || value === null ? '–' : Number.isInteger(value) ? value.toLocaleString('en') : significant(value, 2));
+  const cell = (value) => make('td', { textContent: text(value) });
   if (run.quality.length) {
     const head = make('tr', {}, ...used.map(([, words]) => make('th', { textContent: words, scope: 'col' })));
     const rows = run.quality.map((row) => make('tr', {}, ...used.map(([name]) => cell(row[name]))));
