@@ -76,10 +76,8 @@ fn of_ply(shape: &Shape) -> Result<Appearance, ShapeError> {
             .properties
             .contains_key(*name)
     };
-    let is_coloured = COLOUR.iter().all(|name| has(&name));
-    let texture_names = TEXTURE
-        .into_iter()
-        .find(|names| names.iter().all(|name| has(&name)));
+    let is_coloured = COLOUR.iter().all(has);
+    let texture_names = TEXTURE.into_iter().find(|names| names.iter().all(has));
     let mut found = Appearance::plain(shape);
     if !is_coloured && texture_names.is_none() {
         return Ok(found);
