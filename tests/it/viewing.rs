@@ -45,7 +45,7 @@ fn a_page_is_made_where_none_is_and_again_where_the_run_is_newer() {
         "{values}"
     );
     assert!(values.get("truth").is_none(), "there is no ground truth");
-    assert_eq!(found["training"]["steps"].to_string(), "[4,8,10]");
+    assert_eq!(found["training"]["steps"].to_string(), "[1,4,8,10]");
     assert_eq!(lengths(&found["carried"]["times"]), 25);
     assert!(
         found["recipe"]
