@@ -189,6 +189,7 @@ impl fmt::Display for Event {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Tick { step } => write!(formatter, "step {step}"),
+            Self::Preparing(what) => what.fmt(formatter),
             Self::Measuring { done, total } => write!(formatter, "measured {done} of {total}"),
             Self::Matching { stage, done, total } if *done > 0 => {
                 let percent = (100 * done).checked_div(*total).unwrap_or(100);

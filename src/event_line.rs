@@ -19,11 +19,14 @@ const NAMED_TERMS: usize = 3;
 pub(super) fn line(event: &Event, left: Option<Duration>) -> Option<String> {
     Some(match event {
         Event::Matching { stage, done: 0, .. } => format!("finding pairs: {stage}"),
-        Event::Tick { .. } | Event::Measuring { .. } | Event::Matching { .. } | Event::Drawing => {
+        Event::Preparing(_)
+        | Event::Tick { .. }
+        | Event::Measuring { .. }
+        | Event::Matching { .. }
+        | Event::Drawing => {
             return None;
         }
         Event::Started { .. } => return started(event),
-        Event::Preparing(what) => what.to_string(),
         Event::Note(text) => format!("note: {}", text.replace('\n', " ")),
         Event::Matched { .. } => return matched(event),
         Event::PhaseEntered { phase, step } => format!("{phase} from step {} on", step + 1),

@@ -245,12 +245,12 @@ fn rod(vertices: usize, bend: f64) -> Mesh<f64> {
     let last = points.len() as u32 - 1;
     let mut triangles = Vec::new();
     for k in 0..around {
-        triangles.push([0, at(0, k), at(0, k + 1)]);
-        triangles.push([last, at(rings - 1, k + 1), at(rings - 1, k)]);
+        triangles.push([0, at(0, k + 1), at(0, k)]);
+        triangles.push([last, at(rings - 1, k), at(rings - 1, k + 1)]);
         for ring in 1..rings {
             let (low, high) = (ring - 1, ring);
-            triangles.push([at(low, k), at(high, k), at(high, k + 1)]);
-            triangles.push([at(low, k), at(high, k + 1), at(low, k + 1)]);
+            triangles.push([at(low, k), at(high, k + 1), at(high, k)]);
+            triangles.push([at(low, k), at(low, k + 1), at(high, k + 1)]);
         }
     }
     Mesh::new(points, triangles)

@@ -81,6 +81,7 @@ training.velocity-muon-rate    1e-9    0        1        1.001
 training.decay                 1e-9    0        1        1.001
 training.decay-every           1e-9    0        1        1.001
 training.final-learning-rate   0       -1e-9    1        1.001
+training.guided-until 0       -1e-9    1        1.001
 training.warm-up               0       -1e-9    1        1.001
 training.ramp-until            0       -1e-9    1        1.001
 training.velocity-until        0       -1e-9    1        1.001
