@@ -120,12 +120,12 @@ fn written(folder: &Path, page: Option<&Path>) -> String {
         (page.map(Path::to_path_buf), "look at it in a browser"),
         (
             Some(meshes.join("carried.glb")),
-            "your mesh moving, for Blender and the web",
+            "your own vertices moving, for Blender and the web",
         ),
         (Some(meshes.join("surface.glb")), "the surfaces in turn"),
         (
             Some(folder.join("recipe.toml")),
-            "repeats this with `isomorph train`",
+            "repeats the training, with `isomorph train`",
         ),
     ];
     let lines = named
