@@ -14,6 +14,7 @@ pub use isomorph_training::report::{Phase, TermReport};
 mod line;
 
 pub use line::duration;
+pub(crate) use line::significant;
 
 /// The objective and the rates at one logged step.
 #[derive(Clone, Debug, PartialEq)]

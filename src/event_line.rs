@@ -215,7 +215,7 @@ fn grouped(count: usize) -> String {
 }
 
 /// Three significant digits: `0.00123`, `1.23`, `12.3`, `123`, `1.23e-6`.
-fn significant(value: f64) -> String {
+pub(crate) fn significant(value: f64) -> String {
     // Without its sign: the empty sum is -0.
     if value == 0.0 {
         return "0".to_owned();

@@ -18,6 +18,7 @@ mod info;
 mod init;
 mod match_shapes;
 mod morph;
+mod new_run;
 mod normals;
 mod resume;
 mod terminal;

@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use isomorph::morph::{Doubt, MorphOptions, MorphWatch, plan_morph};
-use isomorph::{Event, OutputFormat, Precision, Session, is_run};
+use isomorph::{OutputFormat, Precision, is_run};
 
-use super::view::show;
-use super::{BackendArgs, Failure, QuietArgs, Result, SetArgs, print, stop_on_interrupt};
+use super::new_run::NewRunArgs;
+use super::{Failure, Result, print};
 
 /// Turn one shape into another: an animation and a page to look at, from two files
 ///
@@ -38,28 +38,14 @@ pub(super) struct MorphArgs {
     #[arg(long, value_name = "N", default_value_t = 13, value_parser = clap::value_parser!(u32).range(2..=1000))]
     frames: u32,
 
-    /// Open the page in the browser at the end
-    #[arg(long)]
-    open: bool,
-
-    /// Replace an existing run
-    #[arg(long)]
-    force: bool,
-
     #[command(flatten)]
-    set: SetArgs,
-
-    #[command(flatten)]
-    place: BackendArgs,
-
-    #[command(flatten)]
-    quiet: QuietArgs,
+    new: NewRunArgs,
 }
 
 pub(super) fn run(args: MorphArgs) -> Result {
     let folder = args.output.clone();
     let folder = folder.unwrap_or_else(|| default_folder(&args.source, &args.target));
-    if !args.force && is_run(&folder) {
+    if !args.new.force && is_run(&folder) {
         let folder = folder.display();
         return Err(Failure::Usage(format!(
             "{folder}: exists already; choose another with -o, or replace it with --force"
@@ -72,39 +58,28 @@ pub(super) fn run(args: MorphArgs) -> Result {
             pairs: args.pairs,
             preset: args.preset,
             frames: args.frames as usize,
-            changes: args.set.overrides,
+            changes: args.new.set.overrides.clone(),
         },
     )?;
-    if !args.quiet.quiet {
+    if !args.new.quiet.quiet {
         plan.assumed.iter().for_each(|text| eprintln!("{text}"));
         plan.doubts.iter().for_each(warn);
     }
-    let session = Session::prepare(plan.recipe, &folder, args.place.backend()?)?
-        .stopped_by(stop_on_interrupt())
-        .writing(OutputFormat::Animation(Precision::Full), true);
-    let mut session = if args.force {
-        session.replacing()
-    } else {
-        session
-    };
-    let mut terminal = args.quiet.terminal(&folder);
-    let (mut watch, mut page) = (MorphWatch::default(), None);
-    session.train(|event| {
-        watch.observe(event);
-        if let Event::Reported { path } = event {
-            page = Some(path.clone());
-        }
-        terminal.show(event);
-    })?;
+    let mut watch = MorphWatch::default();
+    let animated = OutputFormat::Animation(Precision::Full);
+    let page = args.new.train(
+        plan.recipe,
+        &folder,
+        |session| session.writing(animated, true),
+        |event| watch.observe(event),
+    )?;
     let doubts = watch.doubts();
     doubts.iter().for_each(warn);
-    if doubts.is_empty() && plan.doubts.is_empty() && !args.quiet.quiet {
+    if doubts.is_empty() && plan.doubts.is_empty() && !args.new.quiet.quiet {
         eprintln!("nothing speaks against the result: one look at the page is still worth it");
     }
     print(&written(&folder, page.as_deref()))?;
-    if let Some(page) = page.filter(|_| args.open) {
-        show(&page);
-    }
+    args.new.open(page.as_deref());
     Ok(())
 }
 

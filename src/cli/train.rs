@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use isomorph::{Event, Recipe, Session, is_run};
+use isomorph::{Recipe, is_run};
 
-use super::view::show;
-use super::{BackendArgs, Failure, QuietArgs, Result, SetArgs, stop_on_interrupt};
+use super::new_run::NewRunArgs;
+use super::{Failure, Result};
 
 /// Train on the two shapes of a recipe, and write surfaces in between
 ///
@@ -22,54 +22,23 @@ pub(super) struct TrainArgs {
     #[arg(long, value_name = "DIR")]
     run: Option<PathBuf>,
 
-    /// Open the page of the run in the browser at the end
-    #[arg(long)]
-    open: bool,
-
-    /// Replace an existing run
-    #[arg(long)]
-    force: bool,
-
     #[command(flatten)]
-    set: SetArgs,
-
-    #[command(flatten)]
-    place: BackendArgs,
-
-    #[command(flatten)]
-    quiet: QuietArgs,
+    new: NewRunArgs,
 }
 
 pub(super) fn run(args: TrainArgs) -> Result {
-    let recipe = Recipe::read(&args.recipe, &args.set.overrides).map_err(isomorph::Error::from)?;
+    let recipe =
+        Recipe::read(&args.recipe, &args.new.set.overrides).map_err(isomorph::Error::from)?;
     let folder = args.run.unwrap_or_else(|| default_run(&args.recipe));
-    if !args.force && is_run(&folder) {
+    if !args.new.force && is_run(&folder) {
         let folder = folder.display();
         return Err(Failure::Usage(format!(
             "{folder}: exists already; resume it with `isomorph resume {folder}`, choose another with \
              --run, or replace it with --force"
         )));
     }
-    let session = Session::prepare(recipe, &folder, args.place.backend()?)?;
-    let session = session.stopped_by(stop_on_interrupt());
-    let mut session = if args.force {
-        session.replacing()
-    } else {
-        session
-    };
-    let mut terminal = args.quiet.terminal(&folder);
-    let mut page = None;
-    session.train(|event| {
-        if let Event::Reported { path } = event {
-            page = Some(path.clone());
-        }
-        terminal.show(event);
-    })?;
-    match page.filter(|_| args.open) {
-        Some(page) => show(&page),
-        None if args.open => eprintln!("no page was written: result.frames is 0"),
-        None => {}
-    }
+    let page = args.new.train(recipe, &folder, |session| session, |_| {})?;
+    args.new.open(page.as_deref());
     Ok(())
 }
 

@@ -90,15 +90,15 @@ pub fn bench_run(options: &BenchRun) -> Result<MeasuredRun> {
     let place = tempfile::tempdir()?;
     let recipe = recipe(options, place.path())?;
     let mut runs = Vec::new();
-    let mut about = (String::new(), Vec::new());
+    let (mut backend, mut vertices) = (String::new(), Vec::new());
     for _ in 0..options.repeats.max(1) {
         let mut clock = Clock::start();
         let run = place.path().join("run");
         let session = Session::prepare(recipe.clone(), &run, options.backend.clone())?;
-        about.1 = session.sizes();
+        vertices = session.sizes();
         session.replacing().train(|event| {
-            if let Event::Started { backend, .. } = event {
-                about.0.clone_from(backend);
+            if let Event::Started { backend: name, .. } = event {
+                backend.clone_from(name);
             }
             clock.observe(event);
         })?;
@@ -108,8 +108,8 @@ pub fn bench_run(options: &BenchRun) -> Result<MeasuredRun> {
     Ok(MeasuredRun {
         whole: total(&stages),
         stages,
-        vertices: about.1,
-        backend: about.0,
+        vertices,
+        backend,
         threads: rayon::current_num_threads(),
         set: options.changes.clone(),
         peak_bytes: memory::peak_memory_bytes(),

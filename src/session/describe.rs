@@ -119,7 +119,8 @@ fn run_info(path: &Path) -> Result<String> {
     Ok(text)
 }
 
-fn box_of(vertices: &[[f64; 3]]) -> ([f64; 3], [f64; 3]) {
+/// The lowest and the highest coordinates of points.
+pub(super) fn box_of(vertices: &[[f64; 3]]) -> ([f64; 3], [f64; 3]) {
     let start = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
     vertices.iter().fold(start, |(low, high), vertex| {
         let low = std::array::from_fn(|axis| f64::min(low[axis], vertex[axis]));

@@ -1,7 +1,7 @@
 //! Two files and nothing else: a recipe chosen for them, what it takes for granted, and what speaks against the
 //! result.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::morph_size::Extent;
 use crate::error::Result;
@@ -128,12 +128,20 @@ const MOST_CYCLE: f64 = 0.03;
 /// Surface and motion that are further apart than this, in normalised units.
 const MOST_APART: f64 = 0.01;
 
+/// What counts of a surface.
+#[derive(Clone, Copy, Debug)]
+struct Watched {
+    time: f64,
+    pieces: usize,
+    /// Between surface and motion.
+    apart: Option<f64>,
+}
+
 /// Watches a run, and says at its end what speaks against its result.
 #[derive(Debug, Default)]
 pub struct MorphWatch {
     doubts: Vec<Doubt>,
-    /// Time, pieces, distance of surface and motion, file.
-    frames: Vec<(f64, usize, Option<f64>, PathBuf)>,
+    frames: Vec<Watched>,
     cut_off: bool,
 }
 
@@ -163,15 +171,17 @@ impl MorphWatch {
             }
             Event::Extracted {
                 time,
-                path,
                 components,
                 consistency,
                 touches_box,
                 ..
             } => {
                 self.cut_off |= touches_box;
-                let frame = (*time, *components, *consistency, path.clone());
-                self.frames.push(frame);
+                self.frames.push(Watched {
+                    time: *time,
+                    pieces: *components,
+                    apart: *consistency,
+                });
             }
             _ => {}
         }
@@ -179,28 +189,24 @@ impl MorphWatch {
 
     /// What speaks against the result; nothing if all looks well.
     pub fn doubts(mut self) -> Vec<Doubt> {
-        let at_ends =
-            |(time, ..): &&(f64, usize, Option<f64>, PathBuf)| *time == 0.0 || *time == 1.0;
-        let whole = self
-            .frames
-            .iter()
-            .filter(at_ends)
-            .map(|frame| frame.1)
-            .max();
-        let worst = self.frames.iter().max_by_key(|frame| frame.1);
-        if let (Some(whole), Some((time, pieces, ..))) = (whole, worst)
+        let at_ends = |frame: &&Watched| frame.time == 0.0 || frame.time == 1.0;
+        let ends = self.frames.iter().filter(at_ends);
+        let whole = ends.map(|frame| frame.pieces).max();
+        let worst = self.frames.iter().max_by_key(|frame| frame.pieces);
+        if let (Some(whole), Some(Watched { time, pieces, .. })) = (whole, worst)
             && *pieces > whole
         {
             let finding =
                 format!("the surface at {time:.2} is in {pieces} pieces, at the ends in {whole}");
             self.doubts.push(Doubt::new(finding, FINER));
         }
-        let apart = |frame: &&(f64, usize, Option<f64>, PathBuf)| frame.2.unwrap_or(0.0);
-        let worst = self
-            .frames
-            .iter()
-            .max_by(|a, b| apart(a).total_cmp(&apart(b)));
-        if let Some((time, _, Some(off), _)) = worst
+        let apart = |frame: &&Watched| frame.apart.unwrap_or(0.0);
+        let worst = (self.frames.iter()).max_by(|a, b| apart(a).total_cmp(&apart(b)));
+        if let Some(Watched {
+            time,
+            apart: Some(off),
+            ..
+        }) = worst
             && *off > MOST_APART
         {
             let finding = format!(
@@ -225,6 +231,8 @@ const LONGER: &str = "try --preset default, which takes minutes, or give pairs w
 
 #[cfg(test)]
 mod tests {
+    use std::path::PathBuf;
+
     use super::*;
 
     fn frame(time: f64, components: usize, consistency: f64) -> Event {

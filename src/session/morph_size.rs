@@ -2,7 +2,9 @@
 
 use std::fmt;
 
+use super::describe::box_of;
 use super::morph::Doubt;
+use crate::event::significant;
 use crate::formats::Shape;
 use crate::geometry::linear::{difference, length};
 
@@ -21,18 +23,8 @@ const FAR_APART: f64 = 1.0;
 
 impl Extent {
     pub(super) fn of(shape: &Shape) -> Self {
-        let start = Self {
-            low: [f64::INFINITY; 3],
-            high: [f64::NEG_INFINITY; 3],
-        };
-        shape
-            .mesh
-            .vertices
-            .iter()
-            .fold(start, |Self { low, high }, x| Self {
-                low: [0, 1, 2].map(|axis| f64::min(low[axis], x[axis])),
-                high: [0, 1, 2].map(|axis| f64::max(high[axis], x[axis])),
-            })
+        let (low, high) = box_of(&shape.mesh.vertices);
+        Self { low, high }
     }
 
     fn sides(&self) -> [f64; 3] {
@@ -49,7 +41,7 @@ impl Extent {
 
     /// The distance of the centres, for people.
     pub(super) fn apart(&self, other: &Self) -> String {
-        short(length(difference(self.centre(), other.centre())))
+        significant(length(difference(self.centre(), other.centre())))
     }
 
     /// What speaks against these being one thing in one frame.
@@ -59,7 +51,7 @@ impl Extent {
         if large > OTHER_UNIT * small {
             let finding = format!(
                 "one shape is {} times as large as the other",
-                short(large / small)
+                significant(large / small)
             );
             let cure =
                 "if their units differ, such as metres and millimetres, bring both to one unit";
@@ -69,7 +61,7 @@ impl Extent {
         if apart > FAR_APART * large {
             let finding = format!(
                 "the centres of the shapes are {} apart, more than their size",
-                short(apart)
+                significant(apart)
             );
             let cure = "the motion will contain this way; lay one shape over the other first if it should not";
             doubts.push(Doubt::new(finding, cure));
@@ -80,21 +72,8 @@ impl Extent {
 
 impl fmt::Display for Extent {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [x, y, z] = self.sides().map(short);
+        let [x, y, z] = self.sides().map(significant);
         write!(formatter, "{x} x {y} x {z}")
-    }
-}
-
-/// Three significant digits.
-fn short(value: f64) -> String {
-    if value == 0.0 {
-        return "0".to_owned();
-    }
-    let digits = 2 - value.abs().log10().floor() as i32;
-    match usize::try_from(digits) {
-        Ok(digits) if digits <= 6 => format!("{value:.digits$}"),
-        Ok(_) => format!("{value:.2e}"),
-        Err(_) => format!("{value:.0}"),
     }
 }
 
@@ -121,7 +100,7 @@ mod tests {
     #[test]
     fn lengths_have_three_digits() {
         assert_eq!(
-            [0.012_34, 1.234, 123.4, 12_345.0].map(short),
+            [0.012_34, 1.234, 123.4, 12_345.0].map(significant),
             ["0.0123", "1.23", "123", "12345"]
         );
     }

@@ -14,7 +14,6 @@ use crate::error::Result;
 use crate::evaluate::GroundTruth;
 use crate::formats;
 use crate::surface::frames::{Frame, FrameEntry};
-use crate::surface::learned::Found;
 
 /// Surfaces that are computed for a page alone have at most so many cells along the longest side of the box.
 const CELLS: usize = 96;
@@ -108,28 +107,8 @@ impl Trained {
         let times = even_times(result.frames.max(FEWEST_SURFACES));
         let frame = |time: f64| -> Result<Frame> {
             let found = learned.surface_at(&grid, time, result.smallest_component, &mut |_| ())?;
-            let Found {
-                mesh,
-                components,
-                left_out,
-                touches_box,
-            } = found;
-            let agreement = learned.agreement(&mesh.vertices, time)?;
-            let entry = FrameEntry {
-                time,
-                surface: String::new(),
-                slope_error: learned.normals(&mesh, time).1,
-                consistency: agreement.map(|found| found.consistency),
-                round_trip: agreement.map(|found| found.round_trip),
-                carried: None,
-            };
-            Ok(Frame {
-                entry,
-                mesh,
-                components,
-                left_out,
-                touches_box,
-            })
+            let (_, slope_error) = learned.normals(&found.mesh, time);
+            Ok(Frame::measured(learned, found, time, slope_error)?)
         };
         times.into_iter().map(frame).collect()
     }

@@ -104,6 +104,32 @@ pub(crate) struct Frame {
     pub touches_box: bool,
 }
 
+impl Frame {
+    /// A surface that was found, with its measures; it names no files yet.
+    pub(crate) fn measured(
+        learned: &Learned,
+        found: Found,
+        time: f64,
+        slope_error: Option<f64>,
+    ) -> Result<Self, FramesError> {
+        let agreement = learned.agreement(&found.mesh.vertices, time)?;
+        Ok(Self {
+            entry: FrameEntry {
+                time,
+                surface: String::new(),
+                slope_error,
+                consistency: agreement.map(|found| found.consistency),
+                round_trip: agreement.map(|found| found.round_trip),
+                carried: None,
+            },
+            mesh: found.mesh,
+            components: found.components,
+            left_out: found.left_out,
+            touches_box: found.touches_box,
+        })
+    }
+}
+
 /// Writes the frames and `frames.json`; `done` is told of each and may stop the work by returning false.
 ///
 /// Files of an earlier extraction in the same folder that the new `frames.json` does not list are deleted.
@@ -176,13 +202,9 @@ fn write_frame(
 ) -> Result<Frame, FramesError> {
     let time = options.times[k];
     let surface = options.format.surface(k);
-    let Found {
-        mesh,
-        components,
-        left_out,
-        touches_box,
-    } = learned.surface_at(grid, time, options.smallest_component, &mut |_| {})?;
-    let (normals, slope_error) = learned.normals(&mesh, time);
+    let found = learned.surface_at(grid, time, options.smallest_component, &mut |_| {})?;
+    let mesh = &found.mesh;
+    let (normals, slope_error) = learned.normals(mesh, time);
     let mut placed = mesh.moved(|x| learned.normalisation.invert(x));
     match options.format {
         OutputFormat::Frames(format) => {
@@ -196,22 +218,10 @@ fn write_frame(
             triangles: placed.triangles,
         }),
     }
-    let agreement = learned.agreement(&mesh.vertices, time)?;
-    let entry = FrameEntry {
-        time,
-        surface,
-        slope_error,
-        consistency: agreement.map(|found| found.consistency),
-        round_trip: agreement.map(|found| found.round_trip),
-        carried,
-    };
-    Ok(Frame {
-        entry,
-        mesh,
-        components,
-        left_out,
-        touches_box,
-    })
+    let mut frame = Frame::measured(learned, found, time, slope_error)?;
+    frame.entry.surface = surface;
+    frame.entry.carried = carried;
+    Ok(frame)
 }
 
 /// Carries the vertices of a shape through all times and writes them; the name of the file for each time.

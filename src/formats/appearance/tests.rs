@@ -1,3 +1,5 @@
+//! The colours, textures, groups and materials of small files.
+
 use super::*;
 use crate::formats;
 

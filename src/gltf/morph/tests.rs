@@ -1,3 +1,5 @@
+//! Animated files of one mesh, read back.
+
 use super::super::testing::{Glb, approx};
 use super::*;
 

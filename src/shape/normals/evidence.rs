@@ -32,7 +32,6 @@ pub(super) fn outward(
 ) -> Vec<f64> {
     let problem = Problem {
         tree: SummationTree::new(points, softening),
-        points,
         areas,
     };
     let dipoles = problem.solve();
@@ -50,7 +49,6 @@ pub(super) fn outward(
 /// dipoles per area, so that dense places do not get more of a say.
 struct Problem<'a> {
     tree: SummationTree,
-    points: &'a [[f64; 3]],
     areas: &'a [f64],
 }
 
@@ -63,8 +61,8 @@ impl Problem<'_> {
     /// adjoint of `W` here ([`SummationTree::pull_at_points`]). Here the curvature is a sum of squares, which
     /// cannot be negative, and the residual is that of the equations themselves.
     fn solve(&self) -> Vec<[f64; 3]> {
-        let mut dipoles = vec![[0.0; 3]; self.points.len()];
-        let mut residual = vec![0.5; self.points.len()];
+        let mut dipoles = vec![[0.0; 3]; self.areas.len()];
+        let mut residual = vec![0.5; self.areas.len()];
         let (mut gradient, mut slope) = self.gradient(&residual);
         let mut direction = gradient;
         // A fixed number of steps and no tolerance: stopping early is the regularisation.

@@ -1,0 +1,67 @@
+//! What all commands share that train a new run.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use isomorph::{Event, Recipe, Session};
+
+use super::view::show;
+use super::{BackendArgs, QuietArgs, Result, SetArgs, stop_on_interrupt};
+
+/// How a new run is made and shown.
+#[derive(Debug, Args)]
+pub(super) struct NewRunArgs {
+    /// Open the page of the run in the browser at the end
+    #[arg(long)]
+    open: bool,
+
+    /// Replace an existing run
+    #[arg(long)]
+    pub force: bool,
+
+    #[command(flatten)]
+    pub set: SetArgs,
+
+    #[command(flatten)]
+    place: BackendArgs,
+
+    #[command(flatten)]
+    pub quiet: QuietArgs,
+}
+
+impl NewRunArgs {
+    /// Trains a recipe into a folder, a session that `change` has changed, and shows its events; the page of the
+    /// run, if one was written.
+    pub(super) fn train(
+        &self,
+        recipe: Recipe,
+        folder: &Path,
+        change: impl FnOnce(Session) -> Session,
+        mut on_event: impl FnMut(&Event),
+    ) -> Result<Option<PathBuf>> {
+        let session = Session::prepare(recipe, folder, self.place.backend()?)?;
+        let mut session = change(session.stopped_by(stop_on_interrupt()));
+        if self.force {
+            session = session.replacing();
+        }
+        let mut terminal = self.quiet.terminal(folder);
+        let mut page = None;
+        session.train(|event| {
+            on_event(event);
+            if let Event::Reported { path } = event {
+                page = Some(path.clone());
+            }
+            terminal.show(event);
+        })?;
+        Ok(page)
+    }
+
+    /// Opens the page of the run, if that is wanted.
+    pub(super) fn open(&self, page: Option<&Path>) {
+        match page {
+            Some(page) if self.open => show(page),
+            None if self.open => eprintln!("no page was written: result.frames is 0"),
+            _ => {}
+        }
+    }
+}
