@@ -177,7 +177,10 @@ fn recipe(options: &BenchOptions, warm_up: &str) -> Result<Recipe> {
         "training.velocity-until=1".to_owned(),
     ]);
     set.extend_from_slice(&options.changes);
-    Ok(Recipe::parse(&text, Path::new("bench"), &set)?)
+    let mut recipe = Recipe::parse(&text, Path::new("bench"), &set)?;
+    // Spheres have no splines: the steps are those that follow paths.
+    recipe.training.guided_until = 0.0;
+    Ok(recipe)
 }
 
 /// The median time of a step after a first one that is reported apart: it compiles kernels on a GPU.

@@ -14,7 +14,7 @@ use crate::event::{Event, StepReport, TermReport};
 use crate::memory;
 use crate::recipe::{Change, Recipe};
 use crate::shape::{Keyframes, Normalisation};
-use crate::solved::{Solved, guide, is_guided};
+use crate::solved::{Solved, guide};
 
 /// Why training stopped before its last step.
 #[derive(Debug, thiserror::Error)]
@@ -87,6 +87,8 @@ pub(crate) struct Learner {
     device: String,
     step: usize,
     seconds: f64,
+    /// What was decided other than the recipe says.
+    notes: Vec<String>,
 }
 
 impl Learner {
@@ -112,15 +114,26 @@ impl Learner {
     ) -> Result<Self, LearnerError> {
         let mut data = keyframes.training_data();
         method::check(&recipe, &data).map_err(LearnerError::Missing)?;
-        if is_guided(&recipe, step) {
-            data.guide = Some(guide(&recipe, keyframes).map_err(LearnerError::Missing)?);
+        let mut notes = Vec::new();
+        // What the networks train by, where it is not what the recipe says.
+        let mut trained = recipe.clone();
+        if method::is_guided(&recipe, step) {
+            match guide(&recipe, keyframes) {
+                Ok(found) => data.guide = Some(found),
+                Err(reason) => {
+                    trained.training.guided_until = 0.0;
+                    notes.push(format!(
+                        "V learns without splines, which takes twice as long: {reason} (training.guided-until)"
+                    ));
+                }
+            }
         }
         let is_solved = method::spline::is_solved(&recipe);
         let trainer: Box<dyn Trainer> = if is_solved {
             let solved = Solved::new(&recipe, keyframes).map_err(LearnerError::Missing)?;
             Box::new(solved)
         } else {
-            engine.method(&recipe, &data.bounds)?
+            engine.method(&trained, &data.bounds)?
         };
         // A solver of our own, which no backend takes part in.
         let (backend, device) = match is_solved {
@@ -136,6 +149,7 @@ impl Learner {
             step,
             seconds: 0.0,
             recipe,
+            notes,
         })
     }
 
@@ -180,6 +194,9 @@ impl Learner {
     ) -> Result<Outcome, LearnerError> {
         checkpoint::sweep(checkpoints);
         emit(self.started())?;
+        for note in self.notes.drain(..) {
+            emit(Event::Note(note))?;
+        }
         let steps = self.recipe.training.steps;
         let (before, clock) = (self.seconds, Instant::now());
         let mut saved = self.step > 0;

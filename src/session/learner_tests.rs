@@ -24,6 +24,7 @@ fn recipe(extra: &[&str]) -> Recipe {
         "training.batch=88",
         "training.correspondence-batch=8",
         "training.steps=10",
+        "training.optimiser=adam",
         "training.log-every=1",
         "checkpoint.every=4",
         "checkpoint.keep=2",

@@ -3,7 +3,6 @@
 
 use isomorph_spline::{Solver, SplineError, SplineField};
 use isomorph_training::data::Guide;
-use isomorph_training::schedule::Schedule;
 
 use super::{options, problem, weights};
 use crate::recipe::{Recipe, RecipeError};
@@ -27,11 +26,6 @@ impl Guide for SplineGuide {
     }
 }
 
-/// Whether step `step` of the recipe needs a guide, or one after it.
-pub(crate) fn is_guided(recipe: &Recipe, step: usize) -> bool {
-    Schedule::new(&recipe.training).is_guided(step)
-}
-
 /// Keys of the steps, which the recipe's own say nothing of.
 const OF_STEPS: [&str; 4] = [
     "preset=instant",
@@ -40,21 +34,33 @@ const OF_STEPS: [&str; 4] = [
     "training.correspondence-batch=1000",
 ];
 
+/// Why no splines can stand in for the motion that a recipe asks for, if so.
+fn misfit(recipe: &Recipe, keyframes: &Keyframes) -> Option<&'static str> {
+    if keyframes.keys.len() != 2 {
+        Some("splines take two shapes")
+    } else if !recipe.velocity.time_dependent {
+        Some("splines depend on time, and velocity.time-dependent is false")
+    } else if recipe.loss.smoothness > 0.0 {
+        Some("splines have no term for loss.smoothness")
+    } else if recipe.loss.strain_scale > 0.0 {
+        Some("splines have no term for loss.strain-scale")
+    } else {
+        None
+    }
+}
+
 /// Solves for the field that the recipe would have with the preset `instant`: its own weights and seed are kept.
 ///
 /// # Errors
-/// More than two key frames, or what the solver refuses.
+/// A motion that splines do not have, or what the solver refuses: the reason, as a part of a sentence.
 pub(crate) fn guide(recipe: &Recipe, keyframes: &Keyframes) -> Result<Box<dyn Guide>, String> {
-    let failed = |reason: &dyn std::fmt::Display| {
-        format!("training.guided-until: no splines were found ({reason}); set it to 0")
-    };
-    if keyframes.keys.len() != 2 {
-        return Err(failed(&"it takes two shapes"));
+    if let Some(reason) = misfit(recipe, keyframes) {
+        return Err(reason.to_owned());
     }
     let mut solved = recipe.clone();
     let keys = OF_STEPS.map(str::to_owned);
     let changed: Result<(), RecipeError> = solved.with_all(&keys);
-    changed.map_err(|error| failed(&error))?;
+    changed.map_err(|error| error.to_string())?;
     let options = options(&solved);
     let trajectory_steps = 2 * options.trajectory_steps;
     let found: Result<SplineField, SplineError> = (|| {
@@ -65,7 +71,7 @@ pub(crate) fn guide(recipe: &Recipe, keyframes: &Keyframes) -> Result<Box<dyn Gu
         Ok(solver.field().clone())
     })();
     Ok(Box::new(SplineGuide {
-        field: found.map_err(|error| failed(&error))?,
+        field: found.map_err(|error| error.to_string())?,
         trajectory_steps,
     }))
 }

@@ -30,7 +30,7 @@ use isomorph_training::records::{RecordError, Records};
 use isomorph_training::report::{Phase, Rates, TermReport};
 
 use self::carried::CarriedShapes;
-pub(crate) use self::guide::{guide, is_guided};
+pub(crate) use self::guide::guide;
 use crate::recipe::Recipe;
 use crate::shape::{Keyframe, Keyframes, Solid, SolidParts};
 

@@ -303,7 +303,19 @@ fn the_guide_of_networks_is_the_field_of_the_preset() {
     let times = vec![0.3; places.len()];
     let expected = solved.field().values(&places, 0.3);
     assert_eq!(guide.velocities(&places, &times), expected);
-    assert!(!is_guided(&network, 0));
-    network.with("training.guided-until=0.5").expect("a recipe");
-    assert!(is_guided(&network, 499) && !is_guided(&network, 500));
+}
+
+#[test]
+fn motions_that_splines_do_not_have_are_named() {
+    let keyframes = keyframes(0.6);
+    for (change, named) in [
+        ("velocity.time-dependent=false", "time-dependent"),
+        ("loss.smoothness=1", "loss.smoothness"),
+        ("loss.strain-scale=0.1", "loss.strain-scale"),
+    ] {
+        let mut network = Recipe::between("a.ply", "b.ply").expect("two files");
+        network.with(change).expect("a recipe");
+        let told = super::guide(&network, &keyframes).err();
+        assert!(told.as_ref().is_some_and(|told| told.contains(named)), "{change}: {told:?}");
+    }
 }

@@ -9,7 +9,7 @@ use isomorph_model::{FlowGeometry, Geometry, TrainBackend, VelocityNet};
 
 use super::ends::OnDevice;
 use super::spec::{Acts, Keys, MethodSpec, Needs};
-use super::{FIXED_OPTIMISER, Method, Trainee};
+use super::{FIXED_OPTIMISER, Method, Trainee, spec_of};
 use crate::data::{Bounds, TrainingData};
 use crate::flow_step::FlowStep;
 use crate::guided::Guided;
@@ -49,6 +49,11 @@ pub(super) static FLOW: MethodSpec = MethodSpec {
     fixed: &FIXED_OPTIMISER,
     changes: &[],
 };
+
+/// Whether V learns from a guide in step `step` of the recipe.
+pub(super) fn is_guided(recipe: &Recipe, step: usize) -> bool {
+    *spec_of(recipe) == FLOW && Schedule::new(&recipe.training).is_guided(step)
+}
 
 /// Points to a side of the lattice that decides how finely the geometry follows the flow.
 const PROBES: usize = 24;

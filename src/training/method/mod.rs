@@ -117,6 +117,12 @@ pub fn spec_of(recipe: &Recipe) -> &'static MethodSpec {
     found.expect("a recipe takes its method's name from the list")
 }
 
+/// Whether step `step` of the recipe takes a velocity field that is there already
+/// ([`TrainingData::guide`]): key `training.guided-until`, in the methods where it acts.
+pub fn is_guided(recipe: &Recipe, step: usize) -> bool {
+    flow::is_guided(recipe, step)
+}
+
 /// The method of a name, where several have it that of the kind of V and of the geometry.
 pub(crate) fn spec(
     name: &str,

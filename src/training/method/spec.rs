@@ -145,15 +145,20 @@ impl MethodSpec {
             .geometry
             .map(|kind| format!("implicit.geometry={kind}"));
         let kind = self.velocity.map(|kind| format!("velocity.kind={kind}"));
+        let steps = self.is_baseline.then(|| BASELINE_STEPS.to_owned());
         let changes = self.changes.iter().map(|change| (*change).to_owned());
         [name]
             .into_iter()
             .chain(geometry)
             .chain(kind)
+            .chain(steps)
             .chain(changes)
             .collect()
     }
 }
+
+/// Methods that start without splines and are moved by Adam have twice the steps of `quick`.
+const BASELINE_STEPS: &str = "training.steps=1000";
 
 /// Sections whose keys act in every method; the first is that above all sections.
 const SHARED: [&str; 6] = [

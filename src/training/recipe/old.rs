@@ -5,7 +5,7 @@
 
 use super::catalogue;
 use super::entry::{Entries, Entry, Place};
-use super::rule::{Rule, Value};
+use super::rule::Rule;
 use super::schema::Key;
 
 /// Keys that had another place until version 0.1, with their present one.
@@ -43,14 +43,17 @@ const fn removed(field: &'static str) -> Key {
     }
 }
 
-/// What runs did before there was a key for it, in the words of a recipe, whatever their preset says now.
-const BEFORE: [(&str, &str); 1] = [("training.optimiser", "adam")];
+/// What runs did before there was a key for it, as TOML, whatever their preset says now.
+const BEFORE: [(&str, &str); 2] = [
+    ("training.optimiser", "\"adam\""),
+    ("training.guided-until", "0"),
+];
 
 /// Gives the recipe of a run that an earlier version wrote what it meant without a key.
 pub(super) fn complete(entries: &mut Entries) {
-    for (id, word) in BEFORE {
+    for (id, text) in BEFORE {
         let key = catalogue::by_id(id).expect("a key of the table");
-        let meant = || Entry::new(key, Value::Text(word.to_owned()), Place::Held);
+        let meant = || Entry::new(key, key.value(text), Place::Held);
         entries.entry(key.id()).or_insert_with(meant);
     }
 }

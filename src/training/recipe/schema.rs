@@ -48,12 +48,18 @@ impl Key {
 
     /// The value that a preset gives, `None` where the recipe must give one.
     pub(crate) fn preset_value(&self, preset: Preset) -> Option<Value> {
-        self.column(preset).map(|text| {
-            toml::de::DeValue::parse(text)
-                .map_err(|error| error.message().to_owned())
-                .and_then(|value| self.rule.admit(value.get_ref()))
-                .expect("each preset's column is read by the tests")
-        })
+        self.column(preset).map(|text| self.value(text))
+    }
+
+    /// The value that TOML of our own tables stands for.
+    ///
+    /// # Panics
+    /// If the key does not take it, which the tests of the tables rule out.
+    pub(crate) fn value(&self, text: &str) -> Value {
+        toml::de::DeValue::parse(text)
+            .map_err(|error| error.message().to_owned())
+            .and_then(|value| self.rule.admit(value.get_ref()))
+            .expect("each value of the tables is read by the tests")
     }
 }
 

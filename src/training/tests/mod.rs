@@ -43,6 +43,8 @@ fn recipe(extra: &[&str]) -> Recipe {
         "training.batch=88",
         "training.correspondence-batch=8",
         "training.steps=10",
+        "training.optimiser=adam",
+        "training.guided-until=0",
     ];
     let small = small.map(str::to_owned);
     let mut recipe = Recipe::parse(text, Path::new("recipe.toml"), &small).expect("a recipe");

@@ -94,7 +94,7 @@ fn no_preset_named_is_the_default_and_a_key_given_wins_over_it() {
     assert_eq!(parsed(SHAPES, &[]).expect("a recipe"), preset("default"));
     let text = format!("preset = 'quick'\nloss = {{ data = 7 }}\n{SHAPES}");
     let quick = parsed(&text, &[]).expect("a recipe");
-    assert_eq!((quick.loss.data, quick.training.steps), (7.0, 1000));
+    assert_eq!((quick.loss.data, quick.training.steps), (7.0, 550));
 }
 
 #[test]
@@ -112,7 +112,7 @@ fn changes_name_the_key_and_both_values() {
         [
             "preset: \"quick\" -> \"paper\"",
             "velocity.width: 96 -> 64",
-            "training.steps: 1000 -> 2000"
+            "training.steps: 550 -> 2000",
         ]
     );
     // Between methods what only one of them has stands with "nothing" for the other.
