@@ -72,6 +72,11 @@ impl Error {
         }
     }
 
+    /// The error inside the library that this one comes from.
+    pub(crate) fn cause(&self) -> Option<&(dyn std::error::Error + Send + Sync + 'static)> {
+        self.source.as_deref()
+    }
+
     /// The same error about a part of the work: `part: message`.
     #[must_use]
     pub(crate) fn within(self, part: &str) -> Self {

@@ -8,8 +8,11 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 pub use crate::matching::MatchStage;
+pub use crate::surface::trust::Trust;
 pub use isomorph_training::report::{Phase, TermReport};
 
+#[path = "event_json.rs"]
+mod as_json;
 #[path = "event_line.rs"]
 mod line;
 
@@ -110,6 +113,13 @@ pub enum Event {
         /// Steps done before it.
         step: usize,
     },
+    /// How far to believe a surface that was extracted.
+    Trusted {
+        /// Its time, 0 to 1.
+        time: f64,
+        /// How far.
+        trust: Trust,
+    },
     /// A step is done.
     Tick {
         /// Steps done.
@@ -182,6 +192,11 @@ impl Event {
     /// the remaining steps may take.
     pub fn line(&self, left: Option<Duration>) -> Option<String> {
         line::line(self, left)
+    }
+
+    /// The event as one JSON object, whose field `event` names the kind. What is not finite is null.
+    pub fn json(&self) -> serde_json::Value {
+        as_json::value(self)
     }
 }
 

@@ -8,7 +8,7 @@
 
 use std::time::Duration;
 
-use super::{Event, StepReport, TermReport};
+use super::{Event, StepReport, TermReport, Trust};
 
 /// Terms that are named one by one; the others are summed.
 const NAMED_TERMS: usize = 3;
@@ -36,6 +36,7 @@ pub(super) fn line(event: &Event, left: Option<Duration>) -> Option<String> {
         }
         Event::Extracting { frames } => format!("extracting {}", counted(*frames, "surface")),
         Event::Extracted { .. } => return extracted(event),
+        Event::Trusted { time, trust } => trusted(*time, trust),
         Event::Reported { path } => format!("report: {}", path.display()),
         Event::Interrupted { step } => {
             format!("interrupted after step {step}: the newest checkpoint holds all of it")
@@ -189,6 +190,18 @@ fn extracted(event: &Event) -> Option<String> {
         text += "; the box cuts it off: train with a larger training.box-margin";
     }
     Some(text)
+}
+
+/// How far to believe a surface, in words.
+fn trusted(time: f64, trust: &Trust) -> String {
+    let [x, y, z] = trust.place.map(significant);
+    format!(
+        "time {time:.3}: surface and motion agree within {} at half of the vertices, {} at 95 %; the worst is {} \
+         at ({x}, {y}, {z})",
+        significant(trust.median),
+        significant(trust.most),
+        significant(trust.greatest)
+    )
 }
 
 /// A number of things: `1 surface`, `20,000 points`, `8 vertices`.

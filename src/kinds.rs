@@ -12,7 +12,7 @@ use crate::compare::{DigestError, PlanError, ReportError, StoreError};
 use crate::cubes::GridError;
 use crate::error::{Error, ErrorKind};
 use crate::evaluate::TruthError;
-use crate::formats::{ShapeError, WriteError};
+use crate::formats::{CarryError, ShapeError, WriteError};
 use crate::matching::MatchError;
 use crate::recipe::RecipeError;
 use crate::session::checkpoint::CheckpointError;
@@ -40,6 +40,10 @@ kinds! {
     NotHere: |_| ErrorKind::Usage;
     ShapeError: |_| ErrorKind::Input;
     WriteError: |_| ErrorKind::Failure;
+    CarryError: |error| match error {
+        CarryError::Shape(_) => ErrorKind::Input,
+        _ => ErrorKind::Failure,
+    };
     StoreError: |_| ErrorKind::Failure;
     DigestError: |_| ErrorKind::Failure;
     ReportError: |_| ErrorKind::Failure;
@@ -52,7 +56,9 @@ kinds! {
         BackendError::NoDevice { .. } => ErrorKind::Failure,
     };
     LearnerError: |error| match error {
-        LearnerError::Missing(_) | LearnerError::NotHere(_) => ErrorKind::Usage,
+        LearnerError::Missing(_) | LearnerError::Unsolved(_) | LearnerError::NotHere(_) => {
+            ErrorKind::Usage
+        }
         _ => ErrorKind::Failure,
     };
     MatchError: |error| match error {
@@ -77,4 +83,12 @@ kinds! {
         FramesError::Shape(_) => ErrorKind::Input,
         _ => ErrorKind::Failure,
     };
+}
+
+impl Error {
+    /// Whether splines (the preset `instant`) failed on shapes on which networks (`quick`) may still succeed.
+    pub fn calls_for_networks(&self) -> bool {
+        let cause = self.cause().and_then(|cause| cause.downcast_ref());
+        matches!(cause, Some(LearnerError::Unsolved(_)))
+    }
 }

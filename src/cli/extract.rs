@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use isomorph::{ExtractOptions, OutputFormat, Precision, SurfaceFormat, Trained, even_times};
 
-use super::{BackendArgs, Failure, QuietArgs, Result, print, stop_on_interrupt};
+use super::{BackendArgs, Failure, ProgressArgs, Result, print, stop_on_interrupt};
 
 /// Write surfaces of a trained run, at any times and in any resolution
 ///
@@ -46,6 +46,25 @@ pub(super) struct ExtractArgs {
     #[arg(long)]
     carry: bool,
 
+    /// Also write animation.png, a moving picture of the surfaces (an animated PNG, which browsers play)
+    #[arg(long)]
+    film: bool,
+
+    /// Also say how far to believe each vertex: numbers in the PLY or glTF files, which MeshLab shows in colours,
+    /// and a line for each time
+    #[arg(long)]
+    trust: bool,
+
+    /// Also write layers at these distances from the surface, such as -0.01,0.02, in the unit of the shapes;
+    /// negative is inside
+    #[arg(
+        long,
+        value_name = "A,B,C",
+        value_delimiter = ',',
+        allow_hyphen_values = true
+    )]
+    layers: Vec<f64>,
+
     /// Drop pieces smaller than this share of the surface area; 0 keeps all
     /// [default: result.smallest-component]
     #[arg(long, value_name = "SHARE")]
@@ -59,7 +78,7 @@ pub(super) struct ExtractArgs {
     place: BackendArgs,
 
     #[command(flatten)]
-    quiet: QuietArgs,
+    progress: ProgressArgs,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -103,14 +122,20 @@ pub(super) fn run(args: ExtractArgs) -> Result {
             .resolution
             .map_or(defaults.resolution, |cells| cells as usize),
         format,
+        film: args.film,
+        trust: args.trust,
+        layers: args.layers,
         carry: args.carry,
         smallest_component: args
             .smallest_component
             .unwrap_or(defaults.smallest_component),
         folder: args.output,
     };
-    let mut terminal = args.quiet.terminal(&args.run);
+    let mut terminal = args.progress.terminal(&args.run);
     let stop = stop_on_interrupt();
     let listing = trained.extract(&options, &stop, |event| terminal.show(event))?;
-    print(&format!("{}\n", listing.display()))
+    match args.progress.json {
+        true => Ok(()),
+        false => print(&format!("{}\n", listing.display())),
+    }
 }

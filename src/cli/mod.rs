@@ -16,6 +16,7 @@ mod evaluate;
 mod extract;
 mod info;
 mod init;
+mod map;
 mod match_shapes;
 mod morph;
 mod new_run;
@@ -24,6 +25,7 @@ mod resume;
 mod terminal;
 mod train;
 mod view;
+mod warp;
 
 use std::io::{self, Write};
 use std::process::ExitCode;
@@ -57,6 +59,8 @@ enum Command {
     Resume(resume::ResumeArgs),
     View(view::ViewArgs),
     Extract(extract::ExtractArgs),
+    Warp(warp::WarpArgs),
+    Map(map::MapArgs),
     Evaluate(evaluate::EvaluateArgs),
     Compare(compare::CompareArgs),
     Match(match_shapes::MatchArgs),
@@ -115,6 +119,32 @@ impl QuietArgs {
     }
 }
 
+/// How progress is reported.
+#[derive(Clone, Copy, Debug, Args)]
+struct ProgressArgs {
+    #[command(flatten)]
+    quiet: QuietArgs,
+
+    /// Print events as JSON on standard output, one object per line, and no lines for people
+    #[arg(long, conflicts_with = "quiet")]
+    json: bool,
+}
+
+impl ProgressArgs {
+    /// What shows the events of the run in this folder.
+    fn terminal(self, run: &std::path::Path) -> Terminal {
+        match self.json {
+            true => Terminal::json(),
+            false => self.quiet.terminal(run),
+        }
+    }
+
+    /// Whether lines for people are printed.
+    fn is_for_people(self) -> bool {
+        !self.json && !self.quiet.quiet
+    }
+}
+
 /// Why a command failed.
 #[derive(Debug)]
 enum Failure {
@@ -169,6 +199,8 @@ pub(crate) fn run(cli: Cli) -> ExitCode {
         Command::Resume(args) => resume::run(args),
         Command::View(args) => view::run(args),
         Command::Extract(args) => extract::run(args),
+        Command::Warp(args) => warp::run(args),
+        Command::Map(args) => map::run(args),
         Command::Evaluate(args) => evaluate::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Match(args) => match_shapes::run(args),

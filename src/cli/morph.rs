@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use isomorph::morph::{Doubt, MorphOptions, MorphWatch, plan_morph};
 use isomorph::{OutputFormat, Precision, is_run};
+use serde_json::{Value, json};
 
 use super::new_run::NewRunArgs;
 use super::{Failure, Result, print};
@@ -30,9 +31,10 @@ pub(super) struct MorphArgs {
     #[arg(long, value_name = "FILE")]
     pairs: Option<String>,
 
-    /// Values of all other keys: instant, quick, default, quality or paper
-    #[arg(long, default_value = "instant")]
-    preset: String,
+    /// Values of all other keys: instant, quick, default, quality or paper [default: instant, and quick where
+    /// instant fails]
+    #[arg(long)]
+    preset: Option<String>,
 
     /// Number of times in the animation, evenly from 0 to 1
     #[arg(long, value_name = "N", default_value_t = 13, value_parser = clap::value_parser!(u32).range(2..=1000))]
@@ -51,34 +53,65 @@ pub(super) fn run(args: MorphArgs) -> Result {
             "{folder}: exists already; choose another with -o, or replace it with --force"
         )));
     }
-    let plan = plan_morph(
-        &args.source,
-        &args.target,
-        &MorphOptions {
-            pairs: args.pairs,
-            preset: args.preset,
+    let plan_with = |preset: &str| {
+        let options = MorphOptions {
+            pairs: args.pairs.clone(),
+            preset: preset.to_owned(),
             frames: args.frames as usize,
             changes: args.new.set.overrides.clone(),
-        },
-    )?;
-    if !args.new.quiet.quiet {
+        };
+        plan_morph(&args.source, &args.target, &options)
+    };
+    let plan = plan_with(args.preset.as_deref().unwrap_or("instant"))?;
+    let progress = args.new.progress;
+    if progress.is_for_people() {
         plan.assumed.iter().for_each(|text| eprintln!("{text}"));
         plan.doubts.iter().for_each(warn);
     }
+    if progress.json {
+        print(&lines(plan.assumed.iter().map(assumed)))?;
+        print(&lines(plan.doubts.iter().map(doubtful)))?;
+    }
     let mut watch = MorphWatch::default();
     let animated = OutputFormat::Animation(Precision::Full);
-    let page = args.new.train(
+    let first = args.new.train(
         plan.recipe,
         &folder,
         |session| session.writing(animated, true),
         |event| watch.observe(event),
-    )?;
+    );
+    let page = match first {
+        Err(Failure::Library(error)) if args.preset.is_none() && error.calls_for_networks() => {
+            let finding = format!("the preset instant failed ({error})");
+            let note = Doubt {
+                finding,
+                cure: "going on with the preset quick, which takes longer".to_owned(),
+            };
+            match progress.json {
+                true => print(&lines([doubtful(&note)].into_iter()))?,
+                false => warn(&note),
+            }
+            watch = MorphWatch::default();
+            args.new.train(
+                plan_with("quick")?.recipe,
+                &folder,
+                // What is there is what the first attempt left.
+                |session| session.writing(animated, true).replacing(),
+                |event| watch.observe(event),
+            )?
+        }
+        other => other?,
+    };
     let doubts = watch.doubts();
-    doubts.iter().for_each(warn);
-    if doubts.is_empty() && plan.doubts.is_empty() && !args.new.quiet.quiet {
-        eprintln!("nothing speaks against the result: one look at the page is still worth it");
+    if progress.json {
+        print(&lines(doubts.iter().map(doubtful)))?;
+    } else {
+        doubts.iter().for_each(warn);
+        if doubts.is_empty() && plan.doubts.is_empty() && progress.is_for_people() {
+            eprintln!("nothing speaks against the result: one look at the page is still worth it");
+        }
+        print(&written(&folder, page.as_deref()))?;
     }
-    print(&written(&folder, page.as_deref()))?;
     args.new.open(page.as_deref());
     Ok(())
 }
@@ -86,6 +119,21 @@ pub(super) fn run(args: MorphArgs) -> Result {
 /// A doubt, and what to do about it.
 fn warn(doubt: &Doubt) {
     eprintln!("doubtful: {}; {}", doubt.finding, doubt.cure);
+}
+
+/// An assumption as an event.
+fn assumed(text: &String) -> Value {
+    json!({"event": "assumed", "text": text})
+}
+
+/// A doubt as an event.
+fn doubtful(doubt: &Doubt) -> Value {
+    json!({"event": "doubtful", "finding": doubt.finding, "cure": doubt.cure})
+}
+
+/// Each value on a line.
+fn lines(values: impl Iterator<Item = Value>) -> String {
+    values.map(|value| format!("{value}\n")).collect()
 }
 
 /// The files that matter, each with what it is for.

@@ -6,7 +6,7 @@ use clap::Args;
 use isomorph::{Event, Recipe, Session};
 
 use super::view::show;
-use super::{BackendArgs, QuietArgs, Result, SetArgs, stop_on_interrupt};
+use super::{BackendArgs, ProgressArgs, Result, SetArgs, stop_on_interrupt};
 
 /// How a new run is made and shown.
 #[derive(Debug, Args)]
@@ -26,7 +26,7 @@ pub(super) struct NewRunArgs {
     place: BackendArgs,
 
     #[command(flatten)]
-    pub quiet: QuietArgs,
+    pub progress: ProgressArgs,
 }
 
 impl NewRunArgs {
@@ -44,7 +44,7 @@ impl NewRunArgs {
         if self.force {
             session = session.replacing();
         }
-        let mut terminal = self.quiet.terminal(folder);
+        let mut terminal = self.progress.terminal(folder);
         let mut page = None;
         session.train(|event| {
             on_event(event);

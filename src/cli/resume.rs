@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use isomorph::Session;
 
-use super::{BackendArgs, QuietArgs, Result, SetArgs, stop_on_interrupt};
+use super::{BackendArgs, ProgressArgs, Result, SetArgs, stop_on_interrupt};
 
 /// Go on with an interrupted run, or train a finished one for longer
 ///
@@ -24,13 +24,13 @@ pub(super) struct ResumeArgs {
     place: BackendArgs,
 
     #[command(flatten)]
-    quiet: QuietArgs,
+    progress: ProgressArgs,
 }
 
 pub(super) fn run(args: ResumeArgs) -> Result {
     let session = Session::resume(&args.run, &args.set.overrides, args.place.backend()?)?;
     let mut session = session.stopped_by(stop_on_interrupt());
-    let mut terminal = args.quiet.terminal(&args.run);
+    let mut terminal = args.progress.terminal(&args.run);
     session.train(|event| terminal.show(event))?;
     Ok(())
 }

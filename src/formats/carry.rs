@@ -16,7 +16,7 @@ use ply_rs::writer::Writer;
 use super::error::ShapeError;
 use super::obj::{Corner, Counts, parse_corner, statements, words};
 use super::ply::PlyFile;
-use super::read::read;
+use super::read::read_any;
 use super::shape::Shape;
 use crate::atomic::write_atomically;
 
@@ -70,7 +70,7 @@ pub enum CarryError {
 
 /// Writes `original` again to `out`, its vertices at `positions` and all else as it was.
 ///
-/// `positions` are in the user's coordinates and in the order in which [`read`] gives the
+/// `positions` are in the user's coordinates and in the order in which [`read_any`] gives the
 /// vertices. `out` may be the original's own name. PLY keeps its encoding and the types of its
 /// coordinates, except that whole numbers become float64.
 ///
@@ -92,7 +92,7 @@ pub(crate) fn rewrite_vertices(
             needed,
         });
     }
-    let mut shape = read(original)?;
+    let mut shape = read_any(original)?;
     if positions.len() != shape.mesh.vertices.len() {
         let (found, needed) = (positions.len(), shape.mesh.vertices.len());
         return Err(CarryError::Count {
@@ -111,7 +111,7 @@ pub(crate) fn rewrite_vertices(
         });
     }
     shape.mesh.vertices = positions.to_vec();
-    // `read` refuses whatever is neither.
+    // `read_any` refuses whatever is neither.
     if needed == "ply" {
         rewrite_ply(&shape, out)
     } else {

@@ -17,27 +17,30 @@ use super::{obj, ply};
 /// that refer to vertices that do not exist, a cloud of fewer than [`FEWEST_POINTS`](super::FEWEST_POINTS) points,
 /// vertices all in one place, no area.
 pub(crate) fn read(path: &Path) -> Result<Shape, ShapeError> {
+    read_any(path)?.checked()
+}
+
+/// Reads points of any kind and number, whether or not they could be a shape: to be moved by a motion.
+///
+/// # Errors
+/// Those of [`read`] that are about the file.
+pub(crate) fn read_any(path: &Path) -> Result<Shape, ShapeError> {
     let extension = path
         .extension()
         .unwrap_or_default()
         .to_string_lossy()
         .to_ascii_lowercase();
-    let shape = match extension.as_str() {
-        "ply" => ply::read(path)?,
-        "obj" => obj::read(path)?,
-        "anime" => {
-            return Err(ShapeError::NotOneShape {
-                path: path.to_owned(),
-            });
-        }
-        _ => {
-            return Err(ShapeError::UnknownFormat {
-                path: path.to_owned(),
-                extension,
-            });
-        }
-    };
-    shape.checked()
+    match extension.as_str() {
+        "ply" => ply::read(path),
+        "obj" => obj::read(path),
+        "anime" => Err(ShapeError::NotOneShape {
+            path: path.to_owned(),
+        }),
+        _ => Err(ShapeError::UnknownFormat {
+            path: path.to_owned(),
+            extension,
+        }),
+    }
 }
 
 impl Shape {

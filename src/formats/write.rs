@@ -109,10 +109,41 @@ pub(crate) fn write_surface(
     path: &Path,
     format: SurfaceFormat,
 ) -> Result<(), WriteError> {
+    write_surface_with(surface, &[], path, format)
+}
+
+/// A number for each vertex, under the name that it has in a PLY file.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Attribute<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// One for each vertex.
+    pub values: &'a [f32],
+}
+
+/// [`write_surface`] with more numbers for each vertex; OBJ holds none.
+///
+/// # Errors
+/// Those of [`write_surface`].
+///
+/// # Panics
+/// If an attribute has not one number for each vertex.
+pub(crate) fn write_surface_with(
+    surface: &Mesh<f64>,
+    attributes: &[Attribute<'_>],
+    path: &Path,
+    format: SurfaceFormat,
+) -> Result<(), WriteError> {
     check(surface, path)?;
+    let count = surface.vertices.len();
+    assert!(
+        attributes.iter().all(|each| each.values.len() == count),
+        "{}: attributes of other vertices",
+        path.display()
+    );
     let wide = needs_f64(&surface.vertices);
     write_atomically(path, |out| match format {
-        SurfaceFormat::Ply => write_ply(surface, wide, out),
+        SurfaceFormat::Ply => write_ply(surface, attributes, wide, out),
         SurfaceFormat::Obj => write_obj(surface, wide, out),
     })?;
     Ok(())
@@ -168,13 +199,15 @@ fn needs_f64(vertices: &[[f64; 3]]) -> bool {
 
 /// One row of a PLY file: a vertex or a face, whichever its element asks for.
 #[derive(Default)]
-struct Row {
+struct Row<'a> {
     position: [f64; 3],
     normal: [f32; 3],
     corners: [i32; 3],
+    attributes: &'a [Attribute<'a>],
+    vertex: usize,
 }
 
-impl PropertyAccess for Row {
+impl PropertyAccess for Row<'_> {
     fn new() -> Self {
         Self::default()
     }
@@ -191,7 +224,13 @@ impl PropertyAccess for Row {
             .iter()
             .position(|&known| known == name)
             .map(|axis| self.normal[axis]);
-        normal.or_else(|| Some(self.get_double(name)? as f32))
+        let attribute = || {
+            let named = self.attributes.iter().find(|each| each.name == name);
+            named.map(|each| each.values[self.vertex])
+        };
+        normal
+            .or_else(attribute)
+            .or_else(|| Some(self.get_double(name)? as f32))
     }
 
     fn get_list_int(&self, _name: &str) -> Option<&[i32]> {
@@ -199,17 +238,31 @@ impl PropertyAccess for Row {
     }
 }
 
-fn write_ply(surface: &Mesh<f64>, wide: bool, mut out: &mut dyn Write) -> io::Result<()> {
-    let [vertex, face] = elements(surface, wide);
+fn write_ply(
+    surface: &Mesh<f64>,
+    attributes: &[Attribute<'_>],
+    wide: bool,
+    mut out: &mut dyn Write,
+) -> io::Result<()> {
+    let [mut vertex, face] = elements(surface, wide);
+    let float = PropertyType::Scalar(ScalarType::Float);
+    for each in attributes {
+        let property = PropertyDef::new(each.name.into(), float.clone());
+        vertex.properties.add(property);
+    }
     let mut header = Header::new();
     header.encoding = Encoding::BinaryLittleEndian;
     header.comments.push("written by isomorph".into());
     header.elements.add(vertex.clone());
     header.elements.add(face.clone());
-    let writer = Writer::<Row>::new();
+    let writer = Writer::<Row<'_>>::new();
     writer.write_header(&mut out, &header)?;
-    let mut row = Row::default();
+    let mut row = Row {
+        attributes,
+        ..Row::default()
+    };
     for (i, &position) in surface.vertices.iter().enumerate() {
+        row.vertex = i;
         row.position = position;
         row.normal = surface
             .normals

@@ -19,6 +19,8 @@ pub(crate) struct Still {
     pub normals: Vec<[f32; 3]>,
     /// Counter-clockwise seen from outside; a surface may have none.
     pub triangles: Vec<[u32; 3]>,
+    /// Numbers for each vertex, under names that begin with `_`, as glTF asks of those of an application.
+    pub attributes: Vec<(&'static str, Vec<f32>)>,
 }
 
 /// The colour of the surfaces (sRGB).
@@ -74,7 +76,7 @@ fn mesh(
 ) -> Value {
     let positions: Vec<[f32; 3]> = still.vertices.iter().map(|x| frame.apply(*x)).collect();
     let normals: Vec<[f32; 3]> = still.normals.iter().map(|n| directed(*n)).collect();
-    let attributes = match precision {
+    let mut attributes = match precision {
         Precision::Full => json!({
             "POSITION": builder.vectors(&positions, true),
             "NORMAL": builder.vectors(&normals, false),
@@ -84,6 +86,9 @@ fn mesh(
             "NORMAL": builder.unit_normals(&normals),
         }),
     };
+    for (name, values) in &still.attributes {
+        attributes[*name] = json!(builder.numbers(values, "SCALAR", 1));
+    }
     let indices = builder.triangles(&still.triangles, positions.len());
     json!({
         "name": name,
@@ -129,6 +134,7 @@ mod tests {
             vertices: (0..vertices).map(corner).collect(),
             normals: vec![[0.0, 0.0, 1.0]; vertices],
             triangles: (2..vertices as u32).map(|k| [0, k - 1, k]).collect(),
+            attributes: vec![("_ROUND_TRIP", (0..vertices).map(|k| k as f32).collect())],
         }
     }
 
@@ -150,6 +156,9 @@ mod tests {
             let primitive = &glb.root["meshes"][k]["primitives"][0];
             let found = glb.vectors(&primitive["attributes"]["POSITION"]);
             approx(&[found], std::slice::from_ref(&still.vertices), 1e-6);
+            let trips = glb.numbers(&primitive["attributes"]["_ROUND_TRIP"]);
+            assert_eq!(trips.len(), still.vertices.len());
+            assert_eq!(trips[2], 2.0);
             let corners = glb.numbers(&primitive["indices"]);
             assert_eq!(corners.len(), 3 * still.triangles.len());
         }

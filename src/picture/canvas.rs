@@ -27,6 +27,16 @@ impl Canvas {
         self.pixels[y * self.width + x] = colour;
     }
 
+    /// Pixels from left to right, and from top to bottom.
+    pub(super) fn size(&self) -> [usize; 2] {
+        [self.width, self.pixels.len() / self.width]
+    }
+
+    /// The colours of all pixels, row by row.
+    pub(super) fn bytes(&self) -> &[u8] {
+        self.pixels.as_flattened()
+    }
+
     /// The picture as a PNG file.
     pub(super) fn png(&self) -> Result<Vec<u8>, EncodingError> {
         let mut bytes = Vec::new();

@@ -1,8 +1,9 @@
-//! One PNG with surfaces side by side, each with its time below.
+//! Surfaces with their times as one PNG, side by side, or as a moving picture.
 //!
 //! | file | what it holds |
 //! |---|---|
 //! | `camera.rs` | from where the surfaces are seen: one camera and one scale for all |
+//! | `film.rs` | the same one after the other, as a moving picture |
 //! | `canvas.rs` | pixels in rows, and PNG |
 //! | `raster.rs` | how one surface is drawn: depth buffer, light, colour of its time |
 //!
@@ -10,6 +11,7 @@
 
 mod camera;
 mod canvas;
+mod film;
 mod raster;
 
 use std::io;
@@ -23,6 +25,7 @@ use crate::atomic::write_atomically;
 use crate::geometry::vertex_normals;
 use camera::Camera;
 pub(crate) use camera::View;
+pub(crate) use film::film;
 use canvas::Canvas;
 use raster::Projected;
 
@@ -76,22 +79,21 @@ pub(crate) fn strip(frames: &[Frame<'_>], view: &View, path: &Path) -> Result<()
         .collect();
     let width = camera.width * frames.len();
     let mut picture = Canvas::new(width, view.height as usize + LETTERS.val(), WHITE);
-    for (number, (panel, frame)) in panels.iter().zip(frames).enumerate() {
-        let left = number * camera.width;
-        for (place, &pixel) in panel.iter().enumerate() {
-            let (x, y) = (left + place % camera.width, place / camera.width);
-            picture.put(x, y, pixel);
-        }
-        let label = format!("t = {:.2}", frame.time);
-        write(
-            &mut picture,
-            &label,
-            left + camera.width / 2,
-            view.height as usize,
-        );
+    for (number, (pixels, frame)) in panels.iter().zip(frames).enumerate() {
+        place(&mut picture, pixels, frame.time, &camera, number * camera.width);
     }
     let png = picture.png().map_err(io::Error::other)?;
     Ok(write_atomically(path, |out| out.write_all(&png))?)
+}
+
+/// Puts a surface that was drawn into a picture, from column `left` on, with its time below.
+fn place(picture: &mut Canvas, pixels: &[[u8; 3]], time: f32, camera: &Camera, left: usize) {
+    for (place, &pixel) in pixels.iter().enumerate() {
+        let (x, y) = (left + place % camera.width, place / camera.width);
+        picture.put(x, y, pixel);
+    }
+    let label = format!("t = {time:.2}");
+    write(picture, &label, left + camera.width / 2, camera.height);
 }
 
 fn check(frames: &[Frame<'_>], view: &View, path: &Path) -> Result<(), PictureError> {

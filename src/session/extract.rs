@@ -1,7 +1,7 @@
 //! The surfaces of a run as files: at any times, in any resolution, with a picture of them.
 
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::log::RunLog;
 use super::stop::StopFlag;
@@ -22,6 +22,16 @@ pub struct ExtractOptions {
     pub resolution: usize,
     /// The kind of the files.
     pub format: OutputFormat,
+    /// Whether `animation.png` is written too: a moving picture of the surfaces.
+    pub film: bool,
+    /// Whether each vertex of a surface says how far to believe it: in a PLY as the properties `quality` (how far
+    /// the surface is from those of the ends, carried to its time) and `round_trip` (how far a point misses
+    /// itself that is carried to an end and back), in the shapes' unit; in glTF as `_DISAGREEMENT` and
+    /// `_ROUND_TRIP`. OBJ holds no such numbers.
+    pub trust: bool,
+    /// Distances from the surface at which layers are written as well, negative inside, in the shapes' unit;
+    /// for files of one time each.
+    pub layers: Vec<f64>,
     /// Whether the source's own vertices are carried along as well.
     pub carry: bool,
     /// Pieces with less than this share of a surface's area are left out.
@@ -37,6 +47,9 @@ impl ExtractOptions {
             times: even_times(recipe.result.frames),
             resolution: recipe.result.resolution,
             format: OutputFormat::Frames(SurfaceFormat::Ply),
+            film: false,
+            trust: false,
+            layers: Vec::new(),
             carry: false,
             smallest_component: recipe.result.smallest_component,
             folder: None,
@@ -96,10 +109,26 @@ impl Trained {
                 options.smallest_component
             )));
         }
+        let infinite = |offset: &&f64| !offset.is_finite();
+        if let Some(offset) = options.layers.iter().find(infinite) {
+            return Err(Error::usage(format!(
+                "layer {offset}: must be a finite length"
+            )));
+        }
+        if !options.layers.is_empty() && !matches!(options.format, OutputFormat::Frames(_)) {
+            let text = "layers: an animation has none; take the format ply or obj";
+            return Err(Error::usage(text.to_owned()));
+        }
+        if options.trust && options.format == OutputFormat::Frames(SurfaceFormat::Obj) {
+            let text = "trust: OBJ holds no numbers for vertices; take the format ply or glb";
+            return Err(Error::usage(text.to_owned()));
+        }
         let frame_options = FrameOptions {
             times: options.times.clone(),
             resolution: options.resolution,
             format: options.format,
+            trust: options.trust,
+            layers: options.layers.clone(),
             carry: options
                 .carry
                 .then(|| self.recipe().data.source().to_owned()),
@@ -115,6 +144,10 @@ impl Trained {
         })?;
         let frames = write_frames(self.learned(), &frame_options, |frame| {
             emit(extracted(frame, &frame_options))?;
+            if let Some(trust) = frame.trust {
+                let time = frame.entry.time;
+                emit(Event::Trusted { time, trust })?;
+            }
             Ok(!stop.is_set())
         })?;
         if frames.len() < options.times.len() {
@@ -125,7 +158,7 @@ impl Trained {
             )));
         }
         emit(Event::Drawing)?;
-        show(&frames, &frame_options)?;
+        show(&frames, &frame_options.folder, options.film)?;
         Ok(frames)
     }
 }
@@ -146,24 +179,33 @@ fn extracted(frame: &Frame, options: &FrameOptions) -> Event {
 /// At most this many surfaces fit side by side and can still be told apart.
 const SHOWN: usize = 9;
 
-/// `preview.png`: up to nine of the frames, evenly chosen.
-fn show(frames: &[Frame], options: &FrameOptions) -> io::Result<()> {
+/// A surface as pictures take it.
+fn drawn(frame: &Frame) -> picture::Frame<'_> {
+    picture::Frame {
+        vertices: &frame.mesh.vertices,
+        triangles: &frame.mesh.triangles,
+        time: frame.entry.time as f32,
+    }
+}
+
+/// `preview.png`: up to nine of the frames, evenly chosen; and `animation.png`, all of them in turn.
+pub(super) fn show(frames: &[Frame], folder: &Path, film: bool) -> io::Result<()> {
+    let filled = |frame: &&Frame| !frame.mesh.triangles.is_empty();
+    let view = picture::View::default();
     let count = frames.len().min(SHOWN);
     let chosen = (0..count).map(|k| match count {
         1 => &frames[0],
         _ => &frames[k * (frames.len() - 1) / (count - 1)],
     });
-    let panels: Vec<_> = chosen
-        .filter(|frame| !frame.mesh.triangles.is_empty())
-        .map(|frame| picture::Frame {
-            vertices: &frame.mesh.vertices,
-            triangles: &frame.mesh.triangles,
-            time: frame.entry.time as f32,
-        })
-        .collect();
-    if panels.is_empty() {
-        return Ok(());
+    let panels: Vec<_> = chosen.filter(filled).map(drawn).collect();
+    if !panels.is_empty() {
+        let path = folder.join("preview.png");
+        picture::strip(&panels, &view, &path).map_err(io::Error::other)?;
     }
-    let path = options.folder.join("preview.png");
-    picture::strip(&panels, &picture::View::default(), &path).map_err(io::Error::other)
+    let mut all: Vec<_> = frames.iter().filter(filled).map(drawn).collect();
+    if film && !all.is_empty() {
+        all.sort_by(|a, b| a.time.total_cmp(&b.time));
+        picture::film(&all, &view, &folder.join("animation.png")).map_err(io::Error::other)?;
+    }
+    Ok(())
 }

@@ -36,6 +36,9 @@ pub enum LearnerError {
     /// The method needs what the shapes do not have.
     #[error("{0}")]
     Missing(String),
+    /// Splines cannot be solved for where networks could be trained.
+    #[error("{0}")]
+    Unsolved(String),
     /// The networks of the recipe are not those of the checkpoint.
     #[error(
         "{path}: {} is {} in the checkpoint and {} in the recipe: {why}; restore the value, or start a new run",
@@ -130,7 +133,7 @@ impl Learner {
         }
         let is_solved = method::spline::is_solved(&recipe);
         let trainer: Box<dyn Trainer> = if is_solved {
-            let solved = Solved::new(&recipe, keyframes).map_err(LearnerError::Missing)?;
+            let solved = Solved::new(&recipe, keyframes).map_err(LearnerError::Unsolved)?;
             Box::new(solved)
         } else {
             engine.method(&trained, &data.bounds)?
@@ -192,6 +195,21 @@ impl Learner {
         stop: &AtomicBool,
         emit: &mut dyn FnMut(Event) -> std::io::Result<()>,
     ) -> Result<Outcome, LearnerError> {
+        self.run_with(checkpoints, stop, emit, &mut |_| Ok(()))
+    }
+
+    /// [`Self::run`] that shows what is learned so far each `result.preview-every` steps, by `preview`: where that
+    /// fails, a note has its reason.
+    ///
+    /// # Errors
+    /// Those of [`Self::run`].
+    pub(crate) fn run_with(
+        &mut self,
+        checkpoints: &Path,
+        stop: &AtomicBool,
+        emit: &mut dyn FnMut(Event) -> std::io::Result<()>,
+        preview: &mut dyn FnMut(&dyn Trainer) -> Result<(), String>,
+    ) -> Result<Outcome, LearnerError> {
         checkpoint::sweep(checkpoints);
         emit(self.started())?;
         for note in self.notes.drain(..) {
@@ -221,6 +239,11 @@ impl Learner {
             saved = due;
             if due {
                 self.save(checkpoints, emit)?;
+            }
+            if self.preview_is_due()
+                && let Err(reason) = preview(self.trainer())
+            {
+                emit(Event::Note(format!("no preview after step {}: {reason}", self.step)))?;
             }
             if stop.load(Ordering::Relaxed) && self.step < steps {
                 if !saved {
@@ -256,6 +279,12 @@ impl Learner {
         done.is_multiple_of(self.recipe.checkpoint.every) || done == self.recipe.training.steps
     }
 
+    /// The last step has its surfaces instead.
+    fn preview_is_due(&self) -> bool {
+        let every = self.recipe.result.preview_every;
+        every > 0 && self.step.is_multiple_of(every) && self.step < self.recipe.training.steps
+    }
+
     /// Reports the terms of the step just made, or stops at one that is not finite.
     fn report(
         &self,
@@ -279,6 +308,13 @@ impl Learner {
         };
         emit(Event::Step(report))?;
         let Some(term) = wrong else { return Ok(()) };
+        if method::spline::is_solved(&self.recipe) {
+            return Err(LearnerError::Unsolved(format!(
+                "step {}: the solver found no motion; look for points or pairs far from the rest, or take the \
+                 preset \"quick\"",
+                self.step
+            )));
+        }
         let last = match checkpoint::list(checkpoints).last() {
             Some((step, _)) => format!("last good checkpoint step-{step:06}"),
             None => "no checkpoint was written before".to_owned(),
@@ -288,11 +324,7 @@ impl Learner {
             term: term.name,
             value: term.raw,
             last,
-            cure: if method::spline::is_solved(&self.recipe) {
-                "look for points or pairs far from the rest, or take the preset \"quick\""
-            } else {
-                "try a smaller training.learning-rate"
-            },
+            cure: "try a smaller training.learning-rate",
         })
     }
 

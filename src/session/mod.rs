@@ -7,6 +7,7 @@
 //! | `trained.rs` | [`Trained`]: a run that is opened, and what can be asked of it |
 //! | `extract.rs` | the surfaces of a run as files, with a picture of them |
 //! | `report.rs`, `report_data.rs`, `report_log.rs`, `report_truth.rs` | the page of a run, `report.html` |
+//! | `warp.rs`, `dense_map.rs` | the motion put to use: points of any file, and a map from vertices to vertices |
 //! | `evaluate.rs`, `measure.rs` | a run held against the true frames between its key frames |
 //! | `compare.rs`, `compared.rs` | methods side by side on pairs of frames |
 //! | `pairs.rs`, `normals.rs` | correspondences and normals found from shapes alone |
@@ -25,6 +26,7 @@ pub(crate) mod bench_run;
 pub(crate) mod checkpoint;
 pub(crate) mod compare;
 mod compared;
+pub(crate) mod dense_map;
 pub(crate) mod describe;
 pub(crate) mod evaluate;
 pub(crate) mod extract;
@@ -46,6 +48,7 @@ mod report_truth;
 pub(crate) mod stop;
 pub(crate) mod train;
 pub(crate) mod trained;
+pub(crate) mod warp;
 
 pub use train::Session;
 pub use trained::Trained;

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
-use super::extract::even_times;
+use super::extract::{even_times, show};
 use super::folder::RunFolder;
 use super::report_data::ReportData;
 use super::report_truth::TrueShapes;
@@ -14,12 +14,16 @@ use crate::error::Result;
 use crate::evaluate::GroundTruth;
 use crate::formats;
 use crate::surface::frames::{Frame, FrameEntry};
+use crate::viewer::Page;
 
 /// Surfaces that are computed for a page alone have at most so many cells along the longest side of the box.
 const CELLS: usize = 96;
 
 /// And there are at least so many.
 const FEWEST_SURFACES: usize = 5;
+
+/// Seconds until the page of a run in training loads itself again.
+const RELOADED: u32 = 10;
 
 /// The page of a run if it is there and nothing in the run is newer.
 ///
@@ -59,11 +63,32 @@ impl Trained {
         self.write_report(frames, truth)
     }
 
-    /// The same of surfaces that are there.
+    /// The page and the picture of a run in training, on a coarse grid. The page loads itself again while it is
+    /// open.
+    ///
+    /// # Errors
+    /// Those of [`Self::report`].
+    pub(super) fn preview(&self) -> Result<()> {
+        let frames = self.coarse()?;
+        show(&frames, &self.folder().meshes(), false)?;
+        self.write_page(frames, None, Some(RELOADED))?;
+        Ok(())
+    }
+
+    /// The page of surfaces that are there.
     pub(super) fn write_report(
         &self,
         frames: Vec<Frame>,
         truth: Option<(&GroundTruth, [usize; 2])>,
+    ) -> Result<PathBuf> {
+        self.write_page(frames, truth, None)
+    }
+
+    fn write_page(
+        &self,
+        frames: Vec<Frame>,
+        truth: Option<(&GroundTruth, [usize; 2])>,
+        reloaded: Option<u32>,
     ) -> Result<PathBuf> {
         let true_shapes = match truth {
             Some((truth, ends)) => Some(TrueShapes::of(self, truth, ends)?),
@@ -72,6 +97,7 @@ impl Trained {
         let made = humantime::format_rfc3339_seconds(SystemTime::now()).to_string();
         let page = ReportData::gather(self, frames, true_shapes.as_ref())?.page(&made);
         let path = self.folder().report();
+        let page = Page { reloaded, ..page };
         let html = page.html();
         write_atomically(&path, |out| out.write_all(html.as_bytes()))?;
         Ok(path)
@@ -91,6 +117,7 @@ impl Trained {
                 mesh,
                 left_out: 0,
                 touches_box: false,
+                trust: None,
             })
         });
         frames.collect()

@@ -297,6 +297,7 @@ impl<'a> ReportData<'a> {
             recipe: recipe.to_toml(),
             notes: self.notes,
             thinned: self.thinned,
+            reloaded: None,
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use isomorph_training::engine::Engine;
+use isomorph_training::engine::{Engine, Trainer};
 
 use super::checkpoint::{Checkpoint, CheckpointError};
 use super::folder::RunFolder;
@@ -207,9 +207,17 @@ impl Session {
             on_event(&event);
             log.record(&event)
         };
+        let (recipe, frame) = (&self.recipe, begun.frame);
+        let mut preview = |trainer: &dyn Trainer| -> std::result::Result<(), String> {
+            let learned = learned::learned(trainer.deformation(), recipe, frame);
+            let shown = learned
+                .and_then(|learned| Trained::new(learned, recipe.clone(), run.clone()).preview());
+            shown.map_err(|error| error.to_string())
+        };
+        let (checkpoints, stop) = (run.checkpoints(), self.stop.flag());
         let outcome = begun
             .learner
-            .run(&run.checkpoints(), self.stop.flag(), &mut emit)?;
+            .run_with(&checkpoints, stop, &mut emit, &mut preview)?;
         // What is done is the run's: training again goes on from there.
         self.start = Start::GoOn {
             checkpoint: Checkpoint::newest(&run.checkpoints()).ok().map(Box::new),

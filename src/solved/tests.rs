@@ -316,6 +316,9 @@ fn motions_that_splines_do_not_have_are_named() {
         let mut network = Recipe::between("a.ply", "b.ply").expect("two files");
         network.with(change).expect("a recipe");
         let told = super::guide(&network, &keyframes).err();
-        assert!(told.as_ref().is_some_and(|told| told.contains(named)), "{change}: {told:?}");
+        assert!(
+            told.as_ref().is_some_and(|told| told.contains(named)),
+            "{change}: {told:?}"
+        );
     }
 }

@@ -16,6 +16,9 @@ pub enum FramesError {
     /// Nothing moves points.
     #[error("{0}")]
     NoMotion(String),
+    /// Nothing but a mesh that moves.
+    #[error("this method has no distance field, so it has no layers")]
+    NoField,
     /// No surface at a time.
     #[error("time {time}: {reason}")]
     Extract {
@@ -23,6 +26,27 @@ pub enum FramesError {
         time: f64,
         /// Why.
         reason: ExtractError<Infallible>,
+    },
+    /// No surface at a distance from that of a time.
+    #[error("time {time}, layer {offset}: {reason}; take a layer nearer to the surface")]
+    Layer {
+        /// The time.
+        time: f64,
+        /// The distance, in the user's unit.
+        offset: f64,
+        /// Why.
+        reason: ExtractError<Infallible>,
+    },
+    /// A layer that reaches out of the box that was learned.
+    #[error(
+        "time {time}, layer {offset}: reaches out of the box around the shapes; take a layer nearer to the \
+         surface, or train with a larger training.box-margin"
+    )]
+    LayerCutOff {
+        /// The time.
+        time: f64,
+        /// The distance, in the user's unit.
+        offset: f64,
     },
     /// The shape to be carried cannot be read.
     #[error(transparent)]

@@ -12,10 +12,12 @@ use serde::{Deserialize, Serialize};
 
 use super::animation;
 use super::error::{FramesError, no_motion};
+use super::layers::{LayerEntry, write_layers};
 use super::learned::{Found, Learned};
+use super::trust::{Trust, TrustMap};
 use crate::atomic::write_atomically;
 use crate::cubes::Grid;
-use crate::formats::{self, Shape, SurfaceFormat, rewrite_vertices, write_surface};
+use crate::formats::{self, Shape, SurfaceFormat, rewrite_vertices, write_surface_with};
 use crate::geometry::Mesh;
 use crate::gltf::{Precision, Still};
 
@@ -47,6 +49,10 @@ pub(crate) struct FrameOptions {
     pub resolution: usize,
     /// The kind of the files.
     pub format: OutputFormat,
+    /// Whether each vertex of a surface says how far to believe it.
+    pub trust: bool,
+    /// Distances from the surface, in the user's unit, at which layers are written as well.
+    pub layers: Vec<f64>,
     /// The mesh or cloud whose vertices are carried too, if any.
     pub carry: Option<PathBuf>,
     /// Pieces with less than this share of a surface's area are left out; 0 keeps all.
@@ -77,14 +83,19 @@ pub(crate) struct FrameEntry {
     /// The carried mesh's file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub carried: Option<String>,
+    /// Layers beside the surface.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub layers: Vec<LayerEntry>,
 }
 
 impl FrameEntry {
     /// The files that it names.
     fn files(&self) -> impl Iterator<Item = &str> {
+        let layers = self.layers.iter().map(|layer| &layer.surface);
         [Some(&self.surface), self.carried.as_ref()]
             .into_iter()
             .flatten()
+            .chain(layers)
             .map(String::as_str)
     }
 }
@@ -102,6 +113,8 @@ pub(crate) struct Frame {
     pub left_out: usize,
     /// Whether it reaches the box, and so may be open there.
     pub touches_box: bool,
+    /// How far to believe it, where that was asked for and can be said.
+    pub trust: Option<Trust>,
 }
 
 impl Frame {
@@ -121,11 +134,13 @@ impl Frame {
                 consistency: agreement.map(|found| found.consistency),
                 round_trip: agreement.map(|found| found.round_trip),
                 carried: None,
+                layers: Vec::new(),
             },
             mesh: found.mesh,
             components: found.components,
             left_out: found.left_out,
             touches_box: found.touches_box,
+            trust: None,
         })
     }
 }
@@ -206,21 +221,33 @@ fn write_frame(
     let mesh = &found.mesh;
     let (normals, slope_error) = learned.normals(mesh, time);
     let mut placed = mesh.moved(|x| learned.normalisation.invert(x));
+    let map = match options.trust {
+        true => TrustMap::of(learned, mesh, time)?,
+        false => None,
+    };
+    let map = map.as_ref();
+    let trust = map.and_then(|map| map.summary(&placed.vertices));
     match options.format {
         OutputFormat::Frames(format) => {
             placed.normals = Some(normals);
-            write_surface(&placed, &options.folder.join(&surface), format)?;
+            let attributes = map.map(TrustMap::for_ply);
+            let attributes = attributes.as_ref().map_or(&[][..], |both| &both[..]);
+            let path = options.folder.join(&surface);
+            write_surface_with(&placed, attributes, &path, format)?;
         }
         OutputFormat::Animation(_) => stills.push(Still {
             time,
             vertices: placed.vertices,
             normals,
             triangles: placed.triangles,
+            attributes: map.map_or_else(Vec::new, TrustMap::for_gltf),
         }),
     }
     let mut frame = Frame::measured(learned, found, time, slope_error)?;
+    frame.trust = trust;
     frame.entry.surface = surface;
     frame.entry.carried = carried;
+    frame.entry.layers = write_layers(learned, options, grid, k)?;
     Ok(frame)
 }
 

@@ -71,6 +71,37 @@ impl Learned {
         })
     }
 
+    /// The layer at a time that is `offset` off the surface, in the user's unit, negative inside: where the
+    /// field has this value. Pieces with less than the share `smallest` of its area are left out.
+    ///
+    /// # Errors
+    /// [`FramesError::NoField`], [`FramesError::Layer`] and [`FramesError::LayerCutOff`].
+    pub(crate) fn layer_at(
+        &self,
+        grid: &Grid,
+        time: f64,
+        offset: f64,
+        smallest: f64,
+    ) -> Result<Mesh<f32>, FramesError> {
+        let field = self.deformation.field().ok_or(FramesError::NoField)?;
+        let level = (offset * self.normalisation.scale) as f32;
+        let off = |points: &[[f32; 3]]| {
+            let mut values = field.values(points, time);
+            values.iter_mut().for_each(|value| *value -= level);
+            Ok::<_, Infallible>(values)
+        };
+        let found = extract(off, grid);
+        let found = found.map_err(|reason| FramesError::Layer {
+            time,
+            offset,
+            reason,
+        })?;
+        if found.touches_box {
+            return Err(FramesError::LayerCutOff { time, offset });
+        }
+        Ok(found.mesh.keep_at_least(smallest).0)
+    }
+
     /// The template where the motion takes it.
     fn carried_template(&self, time: f64) -> Result<Found, FramesError> {
         let mut mesh = self.template.clone().ok_or_else(no_motion)?;

@@ -141,7 +141,11 @@ mod tests {
     fn a_cosine_falls_over_the_span_in_which_its_network_trains() {
         let quick = schedule(
             Preset::Quick,
-            &["training.steps=1000", "training.learning-rate=2e-3", "training.velocity-until=0.7"],
+            &[
+                "training.steps=1000",
+                "training.learning-rate=2e-3",
+                "training.velocity-until=0.7",
+            ],
         );
         let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a}, wanted {b}");
         close(quick.velocity_rate(0), 2e-3);
@@ -154,7 +158,10 @@ mod tests {
 
     #[test]
     fn the_scale_of_the_matching_falls_to_its_last_value_until_the_ramp_ends() {
-        let quick = schedule(Preset::Quick, &["training.steps=1000", "training.ramp-until=0.5"]);
+        let quick = schedule(
+            Preset::Quick,
+            &["training.steps=1000", "training.ramp-until=0.5"],
+        );
         let scales = [0, 250, 500, 999].map(|step| quick.matching_scale(0.1, step));
         // Halfway in ratio is halfway in steps.
         for (found, wanted) in scales.iter().zip([1.0, 0.1 * 10f64.sqrt(), 0.1, 0.1]) {

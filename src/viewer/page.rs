@@ -44,6 +44,8 @@ pub(crate) struct Page {
     pub notes: Vec<String>,
     /// What is shown with fewer points than it has, in words.
     pub thinned: Vec<String>,
+    /// Seconds until it loads itself again, of a run in training.
+    pub reloaded: Option<u32>,
 }
 
 /// One of the two shapes.
@@ -111,7 +113,7 @@ impl Page {
             .replace('<', "\\u003c");
         let bytes = STANDARD.encode(block.bytes());
         let title = escaped(&self.title);
-        filled(
+        let html = filled(
             TEMPLATE,
             &[
                 ("TITLE", &title),
@@ -120,7 +122,14 @@ impl Page {
                 ("BYTES", &bytes),
                 ("PROGRAM", PROGRAM),
             ],
-        )
+        );
+        match self.reloaded {
+            None => html,
+            Some(seconds) => {
+                let tag = format!("<meta http-equiv=\"refresh\" content=\"{seconds}\">\n<title>");
+                html.replacen("<title>", &tag, 1)
+            }
+        }
     }
 
     /// All but the arrays, and where these lie.
@@ -252,6 +261,7 @@ mod tests {
             recipe: "preset = \"instant\"".to_owned(),
             notes: vec!["no <normals>".to_owned()],
             thinned: Vec::new(),
+            reloaded: None,
         }
     }
 

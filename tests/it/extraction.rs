@@ -222,3 +222,174 @@ fn described(path: &Path) -> Value {
     let length = u32::from_le_bytes(bytes[12..16].try_into().expect("four bytes")) as usize;
     serde_json::from_slice(&bytes[20..20 + length]).expect("JSON")
 }
+
+#[test]
+fn points_of_any_file_go_with_the_motion_and_the_rest_of_the_file_stays() {
+    let _turn = turn();
+    let place = instant();
+    place.write("line.obj", "# a line\nv 1 0 0\nv 0 0 1\nv 30 0 0\nl 1 2\n");
+    let warp = ["warp", "run", "--points", "line.obj", "-o", "moved.obj"];
+    let ended = place.isomorph(&warp).succeeded();
+    assert!(
+        ended.stdout.contains("3 points moved from time 0 to 1"),
+        "{ended:?}"
+    );
+    assert!(
+        ended.stdout.contains("warning: 1 of them lie outside"),
+        "{ended:?}"
+    );
+    let text = fs::read_to_string(place.path("moved.obj")).expect("a file");
+    let rows = |text: &str| -> Vec<Vec<f64>> {
+        let lines = text.lines().filter_map(|line| line.strip_prefix("v "));
+        lines
+            .map(|line| {
+                line.split(' ')
+                    .map(|word| word.parse().expect("a number"))
+                    .collect()
+            })
+            .collect()
+    };
+    let moved = rows(&text);
+    // The sphere moves by 1 along x.
+    for (found, wanted) in moved.iter().zip([[2.0, 0.0, 0.0], [1.0, 0.0, 1.0]]) {
+        for (a, b) in found.iter().zip(wanted) {
+            assert!((a - b).abs() < 0.02, "{text}");
+        }
+    }
+    assert!(
+        text.contains("# a line") && text.contains("l 1 2"),
+        "{text}"
+    );
+    // There and back, and not at all.
+    let back = [
+        "warp",
+        "run",
+        "--points",
+        "moved.obj",
+        "--from",
+        "1",
+        "--to",
+        "0",
+    ];
+    place
+        .isomorph(&[&back[..], &["-o", "back.obj"]].concat())
+        .succeeded();
+    let back = rows(&fs::read_to_string(place.path("back.obj")).expect("a file"));
+    assert!((back[0][0] - 1.0).abs() < 1e-4, "{back:?}");
+    let late = [
+        "warp", "run", "--points", "line.obj", "--to", "1.5", "-o", "x.obj",
+    ];
+    place
+        .isomorph(&late)
+        .refused(2, &["time 1.5: must be 0 to 1"]);
+    let other = ["warp", "run", "--points", "line.obj", "-o", "x.stp"];
+    place.isomorph(&other).refused(1, &["x.stp"]);
+}
+
+/// A sphere that moves by its radius, solved for, as `run`.
+fn instant() -> Workplace {
+    let sphere = Mesh::sphere(1.0, 3);
+    let target = sphere.clone().map(|x| [x[0] + 1.0, x[1], x[2]]);
+    let place = Workplace::with_pair(&sphere, &target, &[]);
+    let small = [
+        "--set",
+        "preset=instant",
+        "--set",
+        "spline.band=3000",
+        "--set",
+        "data.points=3000",
+    ];
+    place.train("run", &[&small[..], &["--set", "result.frames=0"]].concat());
+    place
+}
+
+#[test]
+fn the_map_sends_each_vertex_where_it_goes_and_is_taken_as_pairs() {
+    let _turn = turn();
+    let place = instant();
+    let ended = place.isomorph(&["map", "run", "-o", "map.csv"]).succeeded();
+    assert!(
+        ended
+            .stdout
+            .contains("target      100.0 % of its vertices are reached"),
+        "{ended:?}"
+    );
+    let text = fs::read_to_string(place.path("map.csv")).expect("a file");
+    let mut lines = text.lines();
+    assert_eq!(lines.next(), Some("source_index,target_index,confidence"));
+    for (k, line) in lines.enumerate() {
+        let [source, target, confidence] = line.split(',').collect::<Vec<_>>()[..] else {
+            panic!("{line}");
+        };
+        assert_eq!((source, target), (&*k.to_string(), &*k.to_string()));
+        let confidence: f64 = confidence.parse().expect("a number");
+        assert!(confidence > 0.9 && confidence <= 1.0, "{line}");
+    }
+    let again = [
+        "--set",
+        "data.correspondences=map.csv",
+        "--set",
+        "training.steps=2",
+    ];
+    place.train(
+        "again",
+        &[&again[..], &["--set", "result.frames=0"]].concat(),
+    );
+}
+
+#[test]
+fn layers_and_trust_stand_beside_the_surface() {
+    let _turn = turn();
+    let place = instant();
+    let extract = "extract run --times 0 --resolution 48 --trust --layers -0.1,0.2 -o out --json";
+    let words: Vec<&str> = extract.split_whitespace().collect();
+    let ended = place.isomorph(&words).succeeded();
+    let events: Vec<Value> = ended
+        .stdout
+        .lines()
+        .map(|line| serde_json::from_str(line).expect("JSON"))
+        .collect();
+    let trusted = events.iter().find(|event| event["event"] == "trusted");
+    let trusted = trusted.expect("a line about trust");
+    assert!(
+        trusted["quantile_95"].as_f64().expect("a length") < 0.01,
+        "{trusted}"
+    );
+    let wanted = [
+        "frames.json",
+        "layer-000-0.ply",
+        "layer-000-1.ply",
+        "preview.png",
+        "surface-000.ply",
+    ];
+    assert_eq!(names(&place.path("out")), wanted);
+    let surface = Ply::read(&place.path("out/surface-000.ply"));
+    let names = ["x", "y", "z", "nx", "ny", "nz", "quality", "round_trip"];
+    assert_eq!(surface.properties, names);
+    assert!(
+        surface
+            .rows
+            .iter()
+            .all(|row| row[6] >= 0.0 && row[6] < 0.02 && row[7] < 0.01)
+    );
+    // At time 0 the sphere is where it was read, and a layer a larger or a smaller one.
+    for (file, radius) in [("layer-000-0.ply", 0.9), ("layer-000-1.ply", 1.2)] {
+        let layer = Ply::read(&place.path("out").join(file));
+        for row in &layer.rows {
+            let found = (row[0] * row[0] + row[1] * row[1] + row[2] * row[2]).sqrt();
+            assert!((found - radius).abs() < 0.02, "{file}: {found}");
+        }
+    }
+    let refused = [
+        "extract", "run", "--layers", "0.1", "--format", "glb", "--quiet",
+    ];
+    place
+        .isomorph(&refused)
+        .refused(2, &["an animation has none"]);
+    let deep = [
+        "extract", "run", "--times", "0", "--layers", "-1.5", "--quiet",
+    ];
+    place
+        .isomorph(&deep)
+        .refused(1, &["layer -1.5", "nearer to the surface"]);
+}

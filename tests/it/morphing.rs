@@ -105,3 +105,30 @@ fn a_file_or_a_preset_that_is_none_leaves_nothing_behind() {
     place.isomorph(&preset).refused(2, &["fast", "instant"]);
     assert_eq!(place.names(), ["a.ply", "b.ply"]);
 }
+
+#[test]
+fn where_splines_fail_networks_go_on() {
+    let _turn = turn();
+    let place = Workplace::new();
+    let cloud = |by: f64| {
+        let mut cloud = Mesh::sphere(1.0, 3).map(|x| [x[0] + by, x[1], x[2]]);
+        cloud.triangles.clear();
+        ply::text(&cloud)
+    };
+    place.write("a.ply", cloud(0.0));
+    place.write("b.ply", cloud(0.3));
+    let morph = "morph a.ply b.ply --pairs same-vertices --frames 2 --set training.steps=18 \
+                 --set result.resolution=32 --set data.points=600 --set data.normals=none";
+    let morph: Vec<&str> = morph.split_whitespace().collect();
+    // The preset that is asked for by name is kept.
+    let alone = place.isomorph(&[&morph[..], &["--preset", "instant"]].concat());
+    assert_eq!(alone.code, Some(2), "{alone:?}");
+    assert!(alone.stderr.contains("the preset \"quick\""), "{alone:?}");
+    assert!(!place.path("runs/a-b").exists(), "nothing is left behind");
+    let ended = place.isomorph(&morph).succeeded();
+    let said = "the preset instant failed";
+    assert!(ended.stderr.contains(said), "{ended:?}");
+    let recipe = fs::read_to_string(place.path("runs/a-b/recipe.toml")).expect("a recipe");
+    assert!(recipe.contains("preset = \"quick\""), "{recipe}");
+    assert!(place.path("runs/a-b/report.html").is_file());
+}

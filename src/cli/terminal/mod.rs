@@ -1,4 +1,4 @@
-//! What standard error shows of a run: a bar, plain lines, or nothing.
+//! What is shown of a run: a bar, plain lines or nothing on standard error, or JSON on standard output.
 //!
 //! A bar needs a terminal that can redraw and somebody who looks at it: with `NO_COLOR` or `CI` set, with
 //! `TERM=dumb`, or into a file or a pipe, plain lines come instead.
@@ -8,22 +8,24 @@ mod pace;
 mod plain;
 
 use std::ffi::OsString;
-use std::io::{self, IsTerminal, Stderr};
+use std::io::{self, IsTerminal, Stderr, Write};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
 use isomorph::Event;
 
 use bar::Bar;
+use pace::Pace;
 use plain::PlainLines;
 
-/// Standard error, as far as the events of a run go.
+/// Where the events of a run go.
 #[derive(Debug)]
 pub(super) struct Terminal(View);
 
 #[derive(Debug)]
 enum View {
     Nothing,
+    Json(Pace),
     Lines(PlainLines<Stderr>),
     Bar(Box<Bar<Stderr>>),
 }
@@ -43,11 +45,25 @@ impl Terminal {
         })
     }
 
+    /// Events as JSON on standard output.
+    pub(super) fn json() -> Self {
+        Self(View::Json(Pace::default()))
+    }
+
     /// Shows an event. A terminal that has gone away is ignored.
     pub(super) fn show(&mut self, event: &Event) {
         let now = Instant::now();
         match &mut self.0 {
             View::Nothing => {}
+            View::Json(pace) => {
+                pace.observe(event, now);
+                let mut value = event.json();
+                if matches!(event, Event::Step(_)) {
+                    value["seconds_left"] = pace.left().map(|left| left.as_secs_f64()).into();
+                }
+                // In one write, so that lines of other processes do not get into it.
+                let _ = io::stdout().write_all(format!("{value}\n").as_bytes());
+            }
             View::Lines(lines) => lines.show(event, now),
             View::Bar(bar) => bar.show(event, now),
         }

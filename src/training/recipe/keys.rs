@@ -313,6 +313,9 @@ section! {
         /// Grid cells along the longest side of the box. More cells keep thinner parts and take
         /// longer.
         resolution: usize = 192 | 192 | 256 | 384 | 192, Rule::whole(8, 2048);
+        /// Steps between two previews: page and picture of the run as it stands, on a coarse grid. A page
+        /// that is open in a browser loads itself again.
+        preview_every: usize = 0 | 0 | 0 | 0 | 0, Rule::whole(0, MANY).unit("steps").zero("writes none");
         /// Pieces of a surface smaller than this share of its area are dropped, such as fingertips
         /// thinner than a cell.
         smallest_component: f64 = 1e-3 | 1e-3 | 1e-3 | 1e-3 | 0,

@@ -126,6 +126,7 @@ pub(crate) const NETWORK: &[&str] = &[
     "implicit.beta = 100",
     "velocity.time-dependent = false",
     "loss.screw = 0",
+    "training.optimiser = \"adam\"",
     "training.learning-rate = 2e-3",
     "training.velocity-until = 0.7",
     "training.integrator = \"midpoint\"",

@@ -1,0 +1,59 @@
+//! `isomorph warp`: points of any file moved along the motion of a run.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use isomorph::Trained;
+
+use super::{BackendArgs, Result, print};
+
+/// Move landmarks, polylines, or any mesh along the motion of a run
+///
+/// The file is written again with its vertices moved. All else in it stays: faces, edges, cells, colours. The
+/// points need not be those that the run was trained on, but should lie near the shapes.
+#[derive(Debug, Args)]
+pub(super) struct WarpArgs {
+    /// Folder of the run
+    run: PathBuf,
+
+    /// File of the points, in the coordinates of the shapes
+    #[arg(long, value_name = "FILE")]
+    points: PathBuf,
+
+    /// Time at which the points are where the file says, 0 (the source) to 1 (the target)
+    #[arg(long, value_name = "T", default_value_t = 0.0)]
+    from: f64,
+
+    /// Time to which they are moved
+    #[arg(long, value_name = "T", default_value_t = 1.0)]
+    to: f64,
+
+    /// Output file, with the ending of the input; or .ply or .obj, which hold vertices and triangles
+    #[arg(long, short, value_name = "FILE")]
+    output: PathBuf,
+
+    #[command(flatten)]
+    place: BackendArgs,
+}
+
+pub(super) fn run(args: WarpArgs) -> Result {
+    let trained = Trained::open(&args.run, args.place.backend()?)?;
+    let times = [args.from, args.to];
+    let warped = trained.warp(&args.points, times, &args.output, |_| {})?;
+    let mut text = format!(
+        "{}: {} points moved from time {} to {}, by {:.3} in the mean and {:.3} at most\n",
+        args.output.display(),
+        warped.points,
+        args.from,
+        args.to,
+        warped.mean,
+        warped.longest
+    );
+    if warped.outside > 0 {
+        text += &format!(
+            "warning: {} of them lie outside the box round the shapes, where the motion is a guess\n",
+            warped.outside
+        );
+    }
+    print(&text)
+}

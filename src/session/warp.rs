@@ -1,0 +1,70 @@
+//! Points of any kind moved along the motion of a run: landmarks, polylines, volume meshes.
+
+use std::path::Path;
+
+use super::trained::Trained;
+use crate::error::Result;
+use crate::formats::{Shape, read_any, rewrite_vertices};
+use crate::geometry::linear::{difference, length};
+
+/// What was moved.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Warped {
+    /// Points of the file.
+    pub points: usize,
+    /// How many of them lie outside the box round the shapes in which the motion was learned: there it is a
+    /// guess.
+    pub outside: usize,
+    /// The mean way between start and end, in the shapes' unit.
+    pub mean: f64,
+    /// The longest.
+    pub longest: f64,
+}
+
+impl Trained {
+    /// Moves the vertices of a file along the motion from time `from` to time `to`, and writes the file again as
+    /// `out`.
+    ///
+    /// Where both names have the same ending, all that is not a position stays as it was: faces, edges, cells,
+    /// colours, and other elements of a PLY. Else `out`, a PLY or OBJ, has vertices and triangles.
+    /// `progress` is given the number of points moved so far.
+    ///
+    /// # Errors
+    /// A file that cannot be read or written, a time out of range, a method that moves no points.
+    pub fn warp(
+        &self,
+        file: &Path,
+        [from, to]: [f64; 2],
+        out: &Path,
+        progress: impl FnMut(usize),
+    ) -> Result<Warped> {
+        let shape = read_any(file)?;
+        let start = &shape.mesh.vertices;
+        let moved = self.carry_with(start, from, to, progress)?;
+        let ways = start.iter().zip(&moved);
+        let ways: Vec<f64> = ways.map(|(a, b)| length(difference(*b, *a))).collect();
+        let report = Warped {
+            points: start.len(),
+            outside: start.iter().filter(|x| !self.has_learned_at(**x)).count(),
+            mean: ways.iter().sum::<f64>() / ways.len().max(1) as f64,
+            longest: ways.into_iter().fold(0.0, f64::max),
+        };
+        let ending = |path: &Path| path.extension().map(|text| text.to_ascii_lowercase());
+        if ending(out) == ending(file) {
+            rewrite_vertices(file, &moved, out)?;
+        } else {
+            let mut mesh = shape.mesh;
+            mesh.vertices = moved;
+            mesh.normals = None;
+            Shape::of(mesh).write(out)?;
+        }
+        Ok(report)
+    }
+
+    /// Whether a place lies in the box in which the motion was learned.
+    fn has_learned_at(&self, x: [f64; 3]) -> bool {
+        let learned = self.learned();
+        let (x, bounds) = (learned.normalisation.apply(x), &learned.bounds);
+        (0..3).all(|axis| bounds.min[axis] <= x[axis] && x[axis] <= bounds.max[axis])
+    }
+}
