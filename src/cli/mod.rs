@@ -13,7 +13,9 @@
 mod bench;
 mod compare;
 mod evaluate;
+mod export;
 mod extract;
+mod field;
 mod info;
 mod init;
 mod map;
@@ -61,6 +63,8 @@ enum Command {
     Extract(extract::ExtractArgs),
     Warp(warp::WarpArgs),
     Map(map::MapArgs),
+    Field(field::FieldArgs),
+    Export(export::ExportArgs),
     Evaluate(evaluate::EvaluateArgs),
     Compare(compare::CompareArgs),
     Match(match_shapes::MatchArgs),
@@ -201,6 +205,8 @@ pub(crate) fn run(cli: Cli) -> ExitCode {
         Command::Extract(args) => extract::run(args),
         Command::Warp(args) => warp::run(args),
         Command::Map(args) => map::run(args),
+        Command::Field(args) => field::run(args),
+        Command::Export(args) => export::run(args),
         Command::Evaluate(args) => evaluate::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Match(args) => match_shapes::run(args),

@@ -4,8 +4,8 @@
 use std::io;
 use std::path::Path;
 
-use rayon::prelude::*;
 use png::{BitDepth, ColorType, Encoder, EncodingError};
+use rayon::prelude::*;
 
 use super::camera::Camera;
 use super::canvas::Canvas;

@@ -25,8 +25,8 @@ use crate::atomic::write_atomically;
 use crate::geometry::vertex_normals;
 use camera::Camera;
 pub(crate) use camera::View;
-pub(crate) use film::film;
 use canvas::Canvas;
+pub(crate) use film::film;
 use raster::Projected;
 
 const WHITE: [u8; 3] = [255; 3];
@@ -80,7 +80,13 @@ pub(crate) fn strip(frames: &[Frame<'_>], view: &View, path: &Path) -> Result<()
     let width = camera.width * frames.len();
     let mut picture = Canvas::new(width, view.height as usize + LETTERS.val(), WHITE);
     for (number, (pixels, frame)) in panels.iter().zip(frames).enumerate() {
-        place(&mut picture, pixels, frame.time, &camera, number * camera.width);
+        place(
+            &mut picture,
+            pixels,
+            frame.time,
+            &camera,
+            number * camera.width,
+        );
     }
     let png = picture.png().map_err(io::Error::other)?;
     Ok(write_atomically(path, |out| out.write_all(&png))?)

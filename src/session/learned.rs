@@ -77,16 +77,29 @@ pub(super) fn load(
     engine: &dyn Engine,
 ) -> Result<Learned> {
     let state = &checkpoint.state;
-    let mut trainer: Box<dyn Trainer> = if is_solved(recipe) {
-        Box::new(Solved::unset())
-    } else {
-        engine.method(recipe, &state.bounds)?
-    };
-    let restored = trainer.restore(&checkpoint.records()?);
-    restored.map_err(|error| checkpoint.damaged(error))?;
+    let trainer = restored(checkpoint, recipe, engine)?;
     let frame = Frame {
         normalisation: state.normalisation,
         bounds: state.bounds,
     };
     learned(trainer.deformation(), recipe, frame)
+}
+
+/// A method as a checkpoint holds it.
+///
+/// # Errors
+/// If it is damaged, or the method is not compiled for the backend.
+pub(super) fn restored(
+    checkpoint: &Checkpoint,
+    recipe: &Recipe,
+    engine: &dyn Engine,
+) -> Result<Box<dyn Trainer>> {
+    let mut trainer: Box<dyn Trainer> = if is_solved(recipe) {
+        Box::new(Solved::unset())
+    } else {
+        engine.method(recipe, &checkpoint.state.bounds)?
+    };
+    let restored = trainer.restore(&checkpoint.records()?);
+    restored.map_err(|error| checkpoint.damaged(error))?;
+    Ok(trainer)
 }

@@ -243,7 +243,10 @@ impl Learner {
             if self.preview_is_due()
                 && let Err(reason) = preview(self.trainer())
             {
-                emit(Event::Note(format!("no preview after step {}: {reason}", self.step)))?;
+                emit(Event::Note(format!(
+                    "no preview after step {}: {reason}",
+                    self.step
+                )))?;
             }
             if stop.load(Ordering::Relaxed) && self.step < steps {
                 if !saved {

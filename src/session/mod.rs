@@ -8,6 +8,7 @@
 //! | `extract.rs` | the surfaces of a run as files, with a picture of them |
 //! | `report.rs`, `report_data.rs`, `report_log.rs`, `report_truth.rs` | the page of a run, `report.html` |
 //! | `warp.rs`, `dense_map.rs` | the motion put to use: points of any file, and a map from vertices to vertices |
+//! | `sampled_field.rs`, `export.rs` | `f` and `V` for other programs: on a grid, and as networks |
 //! | `evaluate.rs`, `measure.rs` | a run held against the true frames between its key frames |
 //! | `compare.rs`, `compared.rs` | methods side by side on pairs of frames |
 //! | `pairs.rs`, `normals.rs` | correspondences and normals found from shapes alone |
@@ -29,6 +30,7 @@ mod compared;
 pub(crate) mod dense_map;
 pub(crate) mod describe;
 pub(crate) mod evaluate;
+pub(crate) mod export;
 pub(crate) mod extract;
 pub(crate) mod folder;
 mod learned;
@@ -45,6 +47,7 @@ pub(crate) mod report;
 mod report_data;
 mod report_log;
 mod report_truth;
+pub(crate) mod sampled_field;
 pub(crate) mod stop;
 pub(crate) mod train;
 pub(crate) mod trained;

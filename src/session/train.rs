@@ -241,13 +241,10 @@ impl Session {
                 ..ExtractOptions::of(&self.recipe)
             };
             let frames = trained.extract_into(&options, &self.stop, log, on_event)?;
-            let event = match trained.write_report(frames, None) {
-                Ok(path) => Event::Reported { path },
-                // All that was trained is there; the page can be made again.
-                Err(reason) => Event::Note(format!("no report.html was written: {reason}")),
-            };
-            on_event(&event);
-            log.record(&event)?;
+            reported(trained.write_report(frames, None), log, on_event)?;
+        } else if self.recipe.result.preview_every > 0 {
+            // The last preview would go on loading itself.
+            reported(trained.report(None), log, on_event)?;
         }
         Ok(trained)
     }
@@ -317,6 +314,20 @@ impl Session {
         }
         Ok(Begun::new(run, log, learner, &prepared))
     }
+}
+
+/// Says where the page is, or why there is none: all that was trained is there, and the page can be made again.
+fn reported(
+    page: Result<PathBuf>,
+    log: &mut RunLog,
+    on_event: &mut dyn FnMut(&Event),
+) -> Result<()> {
+    let event = match page {
+        Ok(path) => Event::Reported { path },
+        Err(reason) => Event::Note(format!("no report.html was written: {reason}")),
+    };
+    on_event(&event);
+    Ok(log.record(&event)?)
 }
 
 /// A run whose folder is there and whose learner is ready.

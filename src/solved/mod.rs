@@ -28,6 +28,7 @@ use isomorph_training::engine::Trainer;
 use isomorph_training::method::spline;
 use isomorph_training::records::{RecordError, Records};
 use isomorph_training::report::{Phase, Rates, TermReport};
+use isomorph_training::weights::Weights as NetworkWeights;
 
 use self::carried::CarriedShapes;
 pub(crate) use self::guide::guide;
@@ -180,6 +181,11 @@ impl Trainer for Solved {
         }
         self.step = step;
         Ok(())
+    }
+
+    /// Not yet: they would be of splines, and the shapes.
+    fn weights(&self) -> Option<NetworkWeights> {
+        None
     }
 
     fn deformation(&self) -> Box<dyn Deformation> {

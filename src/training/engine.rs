@@ -24,6 +24,7 @@ use crate::recipe::Recipe;
 use crate::records::{RecordError, Records};
 use crate::report::{Phase, Rates, TermReport};
 use crate::samples::Part;
+use crate::weights::Weights;
 use crate::workers::Workers;
 
 /// Why a device cannot be used.
@@ -99,6 +100,9 @@ pub trait Trainer {
     /// # Errors
     /// [`RecordError`] if one is missing or is not of this method.
     fn restore(&mut self, records: &Records) -> Result<(), RecordError>;
+
+    /// What the networks have learned, as plain arrays; `None` if the method has none that others can use.
+    fn weights(&self) -> Option<Weights>;
 
     /// What has been learned so far.
     fn deformation(&self) -> Box<dyn Deformation>;
@@ -271,6 +275,10 @@ impl<B: TrainBackend> Trainer for InTraining<B> {
 
     fn restore(&mut self, records: &Records) -> Result<(), RecordError> {
         self.method.restore(records)
+    }
+
+    fn weights(&self) -> Option<Weights> {
+        self.method.weights()
     }
 
     fn deformation(&self) -> Box<dyn Deformation> {

@@ -19,6 +19,7 @@
 //! | `network_step.rs` | the same with `f(x, t)` in one network |
 //! | `posed.rs` | the objective of a part, its terms and its gradients |
 //! | `optimiser.rs` | Adam with a limited gradient |
+//! | `weights.rs` | networks as plain arrays, for other programs |
 //! | `records.rs` | networks and optimiser states as bytes |
 //! | `engine.rs` | the border to training: a backend without its type |
 //! | `deformation.rs` | the border to what was trained: values and motion of points on the host |
@@ -51,7 +52,7 @@ pub mod schedule;
 pub mod settings;
 mod spheres;
 mod tensors;
-
+pub mod weights;
 mod workers;
 
 #[cfg(test)]

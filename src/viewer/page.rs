@@ -274,6 +274,10 @@ mod tests {
     fn a_page_holds_its_data_and_loads_nothing() {
         let html = page().html();
         assert!(html.contains("<title>fox &lt;quick&gt; &amp; {{RUN}}</title>"));
+        assert!(!html.contains("http-equiv"));
+        let reloaded = Some(10);
+        let html = Page { reloaded, ..page() }.html();
+        assert!(html.contains("<meta http-equiv=\"refresh\" content=\"10\">"));
         for loaded in ["src=\"", "href=\"", "@import", "url("] {
             let own = html.replace(PROGRAM, "");
             assert!(!own.contains(loaded), "{loaded}");

@@ -218,6 +218,8 @@ fn training_that_diverges_names_the_term_the_step_and_the_cure() {
     // Gradients beyond any size, steep sines, and nothing that holds them.
     let place = Workplace::tiny(&[
         "training.steps = 400",
+        "training.optimiser = \"adam\"",
+        "training.guided-until = 0",
         "training.learning-rate = 1",
         "training.velocity-learning-rate = 1",
         "training.clip = 0",

@@ -9,7 +9,14 @@ use std::path::PathBuf;
 use serde_json::{Map, Value, json};
 
 use crate::support::run::{self, Logged};
-use crate::support::workplace::{COLUMNS, Workplace, turn};
+use crate::support::workplace::{NETWORK, SHIPPED, Workplace, turn};
+
+/// The product as it ships, the same without splines to start from, and the paper's geometry.
+const COLUMNS: [(&str, &[&str]); 3] = [
+    ("shipped", SHIPPED),
+    ("without splines", &["training.guided-until = 0"]),
+    ("network", NETWORK),
+];
 
 const COMMAND: &str = "cargo test --release --test it -- --ignored write_the_golden_terms";
 

@@ -44,9 +44,13 @@ fn training_leaves_a_whole_run_and_nothing_else() {
     ];
     assert_eq!(names(&run.0), wanted);
     assert_eq!(run.checkpoints(), ["step-000005", "step-000010"]);
-    let parts = ["ends-optimiser.mpk", "ends.mpk", "state.json"];
-    let velocity = ["velocity-optimiser.mpk", "velocity.mpk"];
-    assert_eq!(names(&run.newest()), [&parts[..], &velocity].concat());
+    let of = |name: &str| {
+        let parts = ["-muon-optimiser", "-optimiser", ""];
+        parts.map(|part| format!("{name}{part}.mpk"))
+    };
+    let state = ["state.json".to_owned()];
+    let wanted = [&of("ends")[..], &state, &of("velocity")].concat();
+    assert_eq!(names(&run.newest()), wanted);
     let surfaces = ["surface-000.ply", "surface-001.ply", "surface-002.ply"];
     let meshes = run.path("meshes");
     assert_eq!(
@@ -358,4 +362,56 @@ fn the_recipe_that_init_prints_trains() {
             .succeeded();
         assert_eq!(place.run(name).step(), 3);
     }
+}
+
+#[test]
+fn previews_show_a_run_in_training_and_the_last_page_stands_still() {
+    let _turn = turn();
+    let keys = ["training.steps = 5", "result.preview-every = 2"];
+    let place = Workplace::tiny(&keys);
+    let run = place.train("run", &[]);
+    assert_eq!(names(&run.path("meshes")), ["preview.png"]);
+    let page = fs::read_to_string(run.path("report.html")).expect("a page");
+    assert!(!page.contains("http-equiv"));
+    let log = fs::read_to_string(run.path("run.log")).expect("a log");
+    assert!(!log.contains("no preview"), "{log}");
+}
+
+#[test]
+fn events_are_json_lines_on_standard_output() {
+    let _turn = turn();
+    let place = Workplace::tiny(KEYS);
+    let words = ["train", "recipe.toml", "--json", "--run", "run"];
+    let ended = place.isomorph(&[&words[..], SURFACES].concat()).succeeded();
+    assert_eq!(ended.stderr, "");
+    let events: Vec<Value> = ended
+        .stdout
+        .lines()
+        .map(|line| serde_json::from_str(line).expect("JSON"))
+        .collect();
+    let kinds: BTreeSet<&str> = events
+        .iter()
+        .map(|event| event["event"].as_str().expect("a kind"))
+        .collect();
+    for kind in [
+        "started",
+        "phase",
+        "tick",
+        "step",
+        "checkpoint",
+        "extracting",
+        "extracted",
+        "reported",
+        "finished",
+    ] {
+        assert!(kinds.contains(kind), "no {kind}: {kinds:?}");
+    }
+    let last = events.iter().rfind(|event| event["event"] == "step");
+    let last = last.expect("a step");
+    assert_eq!(
+        (last["step"].as_u64(), last["steps"].as_u64()),
+        (Some(10), Some(10))
+    );
+    assert!(last["terms"]["data"]["weighted"].is_number(), "{last}");
+    assert!(last.get("seconds_left").is_some(), "{last}");
 }

@@ -22,6 +22,7 @@ use crate::samples::{self, Batch, BatchSizes, Drawn, EndBatch};
 use crate::schedule::Schedule;
 use crate::settings::Settings;
 use crate::tensors::rows;
+use crate::weights::Weights;
 
 /// The default method.
 pub(super) static FLOW: MethodSpec = MethodSpec {
@@ -88,6 +89,14 @@ impl<B: TrainBackend> EndsAndFlow<B> {
             device: device.clone(),
             settings,
         }
+    }
+}
+
+impl<B: TrainBackend> EndsAndFlow<B> {
+    /// The end fields as the flow carries them.
+    fn carried(&self) -> FlowGeometry<B::InnerBackend> {
+        let probes = rows(&lattice(&self.bounds), &self.device);
+        FlowGeometry::new(self.ends.valid(), self.velocity.valid(), probes)
     }
 }
 
@@ -187,10 +196,20 @@ impl<B: TrainBackend> Method<B> for EndsAndFlow<B> {
         self.velocity.restore(records)
     }
 
+    fn weights(&self) -> Option<Weights> {
+        let mut weights = Weights {
+            flow_steps: Some(self.carried().steps()),
+            ..Weights::default()
+        };
+        // Both end fields: `source.` and `target.`.
+        weights.add("source", self.ends.valid().source());
+        weights.add("target", self.ends.valid().target());
+        weights.add("velocity", &self.velocity.valid());
+        Some(weights)
+    }
+
     fn geometry(&self) -> Option<Box<dyn Geometry<B::InnerBackend>>> {
-        let probes = rows(&lattice(&self.bounds), &self.device);
-        let (ends, velocity) = (self.ends.valid(), self.velocity.valid());
-        Some(Box::new(FlowGeometry::new(ends, velocity, probes)))
+        Some(Box::new(self.carried()))
     }
 
     fn motion(&self) -> Option<Box<dyn isomorph_model::Motion<B::InnerBackend>>> {

@@ -39,6 +39,7 @@ use crate::recipe::{self, Change, GeometryKind, Recipe, TrainingRecipe, Velocity
 use crate::records::{RecordError, Records};
 use crate::report::{Phase, Rates};
 use crate::samples::Drawn;
+use crate::weights::Weights;
 
 pub use spec::{MethodSpec, Needs};
 
@@ -175,6 +176,11 @@ pub trait Method<B: TrainBackend>: Sync {
     /// # Errors
     /// [`RecordError`] if a record is missing or of another kind.
     fn restore(&mut self, records: &Records) -> Result<(), RecordError>;
+
+    /// What the networks have learned, as plain arrays; of the methods that isomorph is compared with nothing.
+    fn weights(&self) -> Option<Weights> {
+        None
+    }
 
     /// The surface as it stands, if the method has one of its own.
     fn geometry(&self) -> Option<Box<dyn Geometry<B::InnerBackend>>>;

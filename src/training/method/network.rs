@@ -19,6 +19,7 @@ use crate::report::{Phase, Rates};
 use crate::samples::{self, Batch, BatchSizes, Drawn};
 use crate::schedule::Schedule;
 use crate::settings::Settings;
+use crate::weights::Weights;
 
 /// The paper's method.
 pub(super) static NETWORK: MethodSpec = MethodSpec {
@@ -137,6 +138,13 @@ impl<B: TrainBackend> Method<B> for VelocityField<B> {
     fn restore(&mut self, records: &Records) -> Result<(), RecordError> {
         self.implicit.restore(records)?;
         self.velocity.restore(records)
+    }
+
+    fn weights(&self) -> Option<Weights> {
+        let mut weights = Weights::default();
+        weights.add("implicit", &self.implicit.valid());
+        weights.add("velocity", &self.velocity.valid());
+        Some(weights)
     }
 
     fn geometry(&self) -> Option<Box<dyn Geometry<B::InnerBackend>>> {

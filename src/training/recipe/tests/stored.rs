@@ -23,6 +23,7 @@ fn a_recipe_of_version_0_1_is_the_preset_that_it_was() {
         "training.steps=1000",
         "training.optimiser=adam",
         "training.guided-until=0",
+        "checkpoint.every=200",
     ];
     // The preset's other values that act have not changed since.
     assert_eq!(recipe, parsed(SHAPES, &set).expect("a recipe"));

@@ -1,0 +1,61 @@
+//! The weights of trained networks as plain arrays, under the names of their places: for programs other than
+//! isomorph.
+
+use burn::module::{Module, ModuleVisitor, Param};
+use burn::tensor::Tensor;
+use burn::tensor::backend::Backend;
+
+/// An array of weights.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NamedTensor {
+    /// Where it stands, such as `velocity.mlp.layers.0.weight`.
+    pub name: String,
+    /// Its sides.
+    pub shape: Vec<usize>,
+    /// Its numbers, the last side running fastest.
+    pub values: Vec<f32>,
+}
+
+/// What a method has learned, as arrays.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Weights {
+    /// All arrays.
+    pub tensors: Vec<NamedTensor>,
+    /// Steps of the integrator over all of time, where a flow carries the geometry.
+    pub flow_steps: Option<usize>,
+}
+
+impl Weights {
+    /// Adds the arrays of a network, whose names begin with `name`.
+    pub(crate) fn add<B: Backend>(&mut self, name: &str, net: &impl Module<B>) {
+        let mut collector = Collector {
+            place: vec![name.to_owned()],
+            found: &mut self.tensors,
+        };
+        net.visit(&mut collector);
+    }
+}
+
+struct Collector<'a> {
+    place: Vec<String>,
+    found: &'a mut Vec<NamedTensor>,
+}
+
+impl<B: Backend> ModuleVisitor<B> for Collector<'_> {
+    fn enter_module(&mut self, name: &str, _: &str) {
+        self.place.push(name.to_owned());
+    }
+
+    fn exit_module(&mut self, _: &str, _: &str) {
+        self.place.pop();
+    }
+
+    fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<B, D>>) {
+        let tensor = param.val();
+        self.found.push(NamedTensor {
+            name: self.place.join("."),
+            shape: tensor.dims().to_vec(),
+            values: tensor.into_data().iter::<f32>().collect(),
+        });
+    }
+}
