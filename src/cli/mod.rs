@@ -31,6 +31,7 @@ mod warp;
 
 use std::io::{self, Write};
 use std::process::ExitCode;
+use std::sync::OnceLock;
 
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand};
@@ -231,13 +232,17 @@ fn print(text: &str) -> Result {
 
 /// A flag that Ctrl-C or a request to terminate sets; a second one ends the process at once.
 fn stop_on_interrupt() -> StopFlag {
-    let stop = StopFlag::default();
-    let flag = stop.clone();
-    let handled = ctrlc::set_handler(move || {
-        if flag.set() {
-            std::process::exit(i32::from(ErrorKind::Interruption.exit_status()));
-        }
+    static STOP: OnceLock<StopFlag> = OnceLock::new();
+    let stop = STOP.get_or_init(|| {
+        let stop = StopFlag::default();
+        let flag = stop.clone();
+        let handled = ctrlc::set_handler(move || {
+            if flag.set() {
+                std::process::exit(i32::from(ErrorKind::Interruption.exit_status()));
+            }
+        });
+        handled.expect("one handler for this process");
+        stop
     });
-    handled.expect("one handler for the one command of this process");
-    stop
+    stop.clone()
 }
