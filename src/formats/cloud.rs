@@ -190,9 +190,14 @@ impl Table {
                 columns.colour = Some(at);
             }
         }
-        let note = columns.colour.map(|[from, _, to]| {
+        // Beside normals there is nothing to doubt.
+        let doubtful = columns.colour.filter(|_| columns.normal.is_none());
+        let note = doubtful.map(|[from, _, to]| {
             let (name, from, to) = (path.display(), from + 1, to + 1);
-            format!("{name}: columns {from} to {to} are never negative and not of length 1: taken for colours, not normals")
+            format!(
+                "{name}: columns {from} to {to} are never negative and not of length 1: taken for \
+                 colours, not normals"
+            )
         });
         Ok((columns, note))
     }

@@ -310,12 +310,8 @@ fn what_is_compressed_sparse_or_unknown_is_refused_with_a_cure() {
         message(|root| root["accessors"][0]["sparse"] = json!({})).contains("accessors[0]: sparse")
     );
     let undone = |root: &mut Value| {
-        drop(
-            root["accessors"][0]
-                .as_object_mut()
-                .expect("one")
-                .remove("bufferView"),
-        )
+        let accessor = root["accessors"][0].as_object_mut().expect("one");
+        accessor.remove("bufferView");
     };
     assert!(message(undone).contains("accessors[0]: it has no data"));
     assert!(
