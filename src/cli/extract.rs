@@ -42,7 +42,7 @@ pub(super) struct ExtractArgs {
     compact: bool,
 
     /// Also write the source file with its vertices moved to each time; faces, colours and texture
-    /// coordinates are kept
+    /// coordinates are kept. Formats other than PLY and OBJ are written as PLY, geometry alone
     #[arg(long)]
     carry: bool,
 

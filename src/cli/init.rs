@@ -15,13 +15,13 @@ use super::{Failure, Result, print};
 /// `isomorph train FILE`.
 #[derive(Debug, Args)]
 pub(super) struct InitArgs {
-    /// Shape at time 0, a mesh or point cloud as PLY or OBJ
+    /// Shape at time 0, a mesh or point cloud: PLY, OBJ, STL, OFF, glTF, NPY or text
     source: PathBuf,
 
     /// Shape at time 1
     target: PathBuf,
 
-    /// Corresponding vertices: a CSV file with source_index,target_index on each line, same-vertices, match
+    /// Corresponding vertices: a file with source_index,target_index on each line, same-vertices, match
     /// (found before training), or none
     #[arg(long, value_name = "FILE", default_value = "none")]
     correspondences: String,

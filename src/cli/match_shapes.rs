@@ -20,7 +20,7 @@ use super::{Failure, QuietArgs, Result, print};
 /// shape and back.
 #[derive(Debug, Args)]
 pub(super) struct MatchArgs {
-    /// Shape at time 0, a mesh or point cloud as PLY or OBJ
+    /// Shape at time 0, a mesh or point cloud: PLY, OBJ, STL, OFF, glTF, NPY or text
     source: PathBuf,
 
     /// Shape at time 1

@@ -17,7 +17,7 @@ use super::{Failure, Result, print};
 /// receives report.html, meshes/carried.glb, meshes/surface.glb and recipe.toml, which repeats it all.
 #[derive(Debug, Args)]
 pub(super) struct MorphArgs {
-    /// Shape at time 0, a mesh or point cloud as PLY or OBJ
+    /// Shape at time 0, a mesh or point cloud: PLY, OBJ, STL, OFF, glTF, NPY or text
     source: PathBuf,
 
     /// Shape at time 1
@@ -27,7 +27,7 @@ pub(super) struct MorphArgs {
     #[arg(long, short, value_name = "DIR")]
     output: Option<PathBuf>,
 
-    /// Pairs of points: a CSV file with source_index,target_index on each line, same-vertices, match or none
+    /// Pairs of points: a file with source_index,target_index on each line, same-vertices, match or none
     #[arg(long, value_name = "FILE")]
     pairs: Option<String>,
 

@@ -17,7 +17,7 @@ use super::{Failure, Result, print};
 /// normals before training. The vertices of a mesh are used as a cloud.
 #[derive(Debug, Args)]
 pub(super) struct NormalsArgs {
-    /// Point cloud, PLY or OBJ
+    /// Point cloud: PLY, OBJ, NPY, text and the like
     shape: PathBuf,
 
     /// Output file for points and normals, .ply or .obj

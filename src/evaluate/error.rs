@@ -16,7 +16,7 @@ pub enum TruthError {
     Shape(#[from] ShapeError),
     /// The path is neither a sequence nor a folder.
     #[error(
-        "{}: is not a sequence (allowed: a .anime file, or a folder of .ply or .obj meshes)",
+        "{}: is not a sequence (allowed: a .anime file, or a folder of .ply, .obj or .off meshes)",
         .path.display()
     )]
     NoSequence {

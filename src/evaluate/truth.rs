@@ -124,10 +124,8 @@ impl GroundTruth {
     /// # Panics
     /// If there is no such frame.
     pub fn shape(&self, frame: usize) -> Shape {
-        Shape {
-            path: self.path.clone(),
-            mesh: Mesh::new(self.frames[frame].clone(), self.triangles.clone()),
-        }
+        let mesh = Mesh::new(self.frames[frame].clone(), self.triangles.clone());
+        Shape::at(&self.path, mesh)
     }
 
     /// The stretch between two frames that a run was given as its ends.
@@ -246,7 +244,7 @@ fn unreadable(path: &Path, reason: std::io::Error) -> TruthError {
     })
 }
 
-/// The PLY and OBJ files of a folder, in natural order.
+/// The PLY, OBJ and OFF files of a folder, in natural order.
 fn meshes_in(folder: &Path) -> Result<Vec<PathBuf>, TruthError> {
     let failed = |reason| unreadable(folder, reason);
     let mut named = Vec::new();
@@ -254,7 +252,7 @@ fn meshes_in(folder: &Path) -> Result<Vec<PathBuf>, TruthError> {
         let path = entry.map_err(failed)?.path();
         let extension = path.extension().unwrap_or_default();
         let name = path.file_name().unwrap_or_default().to_string_lossy();
-        let mesh = ["ply", "obj"]
+        let mesh = ["ply", "obj", "off"]
             .iter()
             .any(|known| extension.eq_ignore_ascii_case(known));
         // A hidden file is no frame: some systems leave one beside each file.

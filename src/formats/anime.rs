@@ -85,11 +85,7 @@ impl Sequence {
                 last,
             });
         };
-        let shape = Shape {
-            path: self.path.clone(),
-            mesh: Mesh::of_points(vertices, &self.triangles),
-        };
-        shape.checked()
+        Shape::at(&self.path, Mesh::of_points(vertices, &self.triangles)).checked()
     }
 }
 

@@ -6,15 +6,20 @@
 //! |---|---|
 //! | PLY | `red green blue alpha`, texture coordinates `s t`, `u v` or `texture_u texture_v`, `comment TextureFile` |
 //! | OBJ | colours after the coordinates, `vt`, `g` and `o`, `usemtl`; of `mtllib` `Kd`, `d` and `map_Kd` |
+//! | glTF | `COLOR_0`, texture coordinates, names of nodes, base colours and their pictures |
+//! | clouds in text | colours |
 
 use std::collections::HashMap;
 use std::path::Path;
 
 use ply_rs::ply::{DefaultElement, Property};
 
+use super::cloud::Cloud;
 use super::error::ShapeError;
+use super::gltf;
 use super::obj::{Counts, parse_corner, statements, words};
 use super::ply::PlyFile;
+use super::read::Format;
 use super::shape::{Shape, push_fan};
 use crate::gltf::{Material, Part, Texture};
 
@@ -40,13 +45,15 @@ impl Appearance {
     /// # Errors
     /// A file that has changed since the shape was read.
     pub(crate) fn read(shape: &Shape) -> Result<Self, ShapeError> {
-        let is_obj = shape
-            .path
-            .extension()
-            .is_some_and(|text| text.eq_ignore_ascii_case("obj"));
-        match is_obj {
-            true => of_obj(shape),
-            false => of_ply(shape),
+        match Format::of(&shape.path) {
+            Some(Format::Ply) => of_ply(shape),
+            Some(Format::Obj) => of_obj(shape),
+            Some(Format::Gltf) => gltf::appearance(shape),
+            Some(Format::Cloud) => Ok(Self {
+                colours: Cloud::read(&shape.path)?.colours,
+                ..Self::plain(shape)
+            }),
+            _ => Ok(Self::plain(shape)),
         }
     }
 
@@ -137,7 +144,11 @@ fn number(property: &Property) -> (f64, f64) {
 /// A picture beside a file; none if it is not there, or not of a kind that GLB holds.
 fn texture_of(file: &Path, name: &str) -> Option<Texture> {
     let path = file.with_file_name(name.replace('\\', "/"));
-    let bytes = std::fs::read(path).ok()?;
+    picture(std::fs::read(path).ok()?)
+}
+
+/// A picture by its first bytes; none if it is not of a kind that GLB holds.
+pub(super) fn picture(bytes: Vec<u8>) -> Option<Texture> {
     let mime = match bytes.as_slice() {
         [0x89, b'P', b'N', b'G', ..] => "image/png",
         [0xff, 0xd8, 0xff, ..] => "image/jpeg",

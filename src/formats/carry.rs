@@ -16,8 +16,9 @@ use ply_rs::writer::Writer;
 use super::error::ShapeError;
 use super::obj::{Corner, Counts, parse_corner, statements, words};
 use super::ply::PlyFile;
-use super::read::read_any;
+use super::read::{Format, read_any};
 use super::shape::Shape;
+use super::write::{SurfaceFormat, WriteError, write_surface};
 use crate::atomic::write_atomically;
 
 /// The properties of a vertex that hold its position.
@@ -54,7 +55,7 @@ pub enum CarryError {
         position: [f64; 3],
     },
     /// The original is kept, so its format is too.
-    #[error("{}: cannot hold what {} holds: a carried shape keeps its format; end the name in .{needed}", .out.display(), .original.display())]
+    #[error("{}: is not the format that {} is carried in; end the name in .{needed}", .out.display(), .original.display())]
     OtherFormat {
         /// The file asked for.
         out: PathBuf,
@@ -66,10 +67,14 @@ pub enum CarryError {
     /// The result cannot be written; the message names the file.
     #[error("{0}")]
     Write(io::Error),
+    /// The result cannot be written as PLY; the message names the file.
+    #[error(transparent)]
+    Surface(#[from] WriteError),
 }
 
 /// Writes `original` again to `out`, its vertices at `positions` and all else as it was.
 ///
+/// A format other than PLY and OBJ becomes PLY, with its geometry alone.
 /// `positions` are in the user's coordinates and in the order in which [`read_any`] gives the
 /// vertices. `out` may be the original's own name. PLY keeps its encoding and the types of its
 /// coordinates, except that whole numbers become float64.
@@ -83,7 +88,7 @@ pub(crate) fn rewrite_vertices(
     positions: &[[f64; 3]],
     out: &Path,
 ) -> Result<(), CarryError> {
-    let needed = extension(original);
+    let needed = carried_extension(original);
     if extension(out) != needed {
         let (out, original) = (out.to_owned(), original.to_owned());
         return Err(CarryError::OtherFormat {
@@ -111,12 +116,27 @@ pub(crate) fn rewrite_vertices(
         });
     }
     shape.mesh.vertices = positions.to_vec();
-    // `read_any` refuses whatever is neither.
-    if needed == "ply" {
-        rewrite_ply(&shape, out)
-    } else {
-        rewrite_obj(&shape, out)
+    match Format::of(original) {
+        Some(Format::Ply) => rewrite_ply(&shape, out),
+        Some(Format::Obj) => rewrite_obj(&shape, out),
+        _ => write_moved(shape, out),
     }
+}
+
+/// The extension of the carried file, in lower case: PLY and OBJ keep theirs, all others become PLY.
+pub(crate) fn carried_extension(original: &Path) -> String {
+    match Format::of(original) {
+        Some(Format::Ply | Format::Obj) => extension(original),
+        _ => "ply".to_owned(),
+    }
+}
+
+/// The geometry alone, as PLY.
+fn write_moved(mut shape: Shape, out: &Path) -> Result<(), CarryError> {
+    let keeps_normals = shape.mesh.normals.take().is_some() && shape.is_mesh();
+    shape.mesh.normals = keeps_normals.then(|| shape.mesh.vertex_normals());
+    write_surface(&shape.mesh, out, SurfaceFormat::Ply)?;
+    Ok(())
 }
 
 /// The extension in lower case.

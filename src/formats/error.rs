@@ -27,12 +27,14 @@ pub enum ShapeError {
         path: PathBuf,
     },
     /// The extension is none that can be read.
-    #[error("{}: unknown kind of shape (extension {extension:?}; allowed: .ply, .obj)", .path.display())]
+    #[error("{}: unknown kind of shape (extension {extension:?}; allowed: {allowed})", .path.display())]
     UnknownFormat {
         /// The file.
         path: PathBuf,
         /// Its extension, in lower case.
         extension: String,
+        /// The extensions that are allowed.
+        allowed: String,
     },
     /// A sequence was given where one shape is expected.
     #[error("{}: is a sequence of frames, not one shape; save one frame as .ply or .obj", .path.display())]
@@ -162,7 +164,7 @@ pub enum ShapeError {
 
 impl ShapeError {
     /// A [`ShapeError::Malformed`] in the file at `path`.
-    pub(super) fn malformed(path: &std::path::Path, problem: impl Into<String>) -> Self {
+    pub(crate) fn malformed(path: &std::path::Path, problem: impl Into<String>) -> Self {
         Self::Malformed {
             path: path.to_owned(),
             problem: problem.into(),

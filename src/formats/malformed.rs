@@ -79,6 +79,14 @@ pub(crate) fn damage() -> impl Strategy<Value = Vec<Damage>> {
     prop::collection::vec(one, 1..4)
 }
 
+/// Writes a file of this name and reads it.
+pub(crate) fn written<T>(name: &str, bytes: &[u8], read: impl Fn(&Path) -> T) -> T {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join(name);
+    std::fs::write(&path, bytes).expect("written");
+    read(&path)
+}
+
 /// Damages a file of this name, reads it, and hands back what came of it with the file's length.
 pub(crate) fn read_damaged<T>(
     name: &str,
@@ -87,10 +95,7 @@ pub(crate) fn read_damaged<T>(
     read: impl Fn(&Path) -> Result<T, ShapeError>,
 ) -> (Result<T, ShapeError>, usize) {
     damage.iter().for_each(|damage| damage.apply(&mut bytes));
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let path = folder.path().join(name);
-    std::fs::write(&path, &bytes).expect("written");
-    (read(&path), bytes.len())
+    (written(name, &bytes, read), bytes.len())
 }
 
 /// An error is one line that names the file; a shape is sound and no larger than its file allows.
@@ -139,6 +144,59 @@ proptest! {
     fn a_damaged_obj_is_read_or_refused(damage in damage()) {
         let bytes = super::obj::tests::HOUSE.as_bytes().to_vec();
         let (result, length) = read_damaged("shape.obj", bytes, &damage, super::read);
+        check(result, length)?;
+    }
+
+    #[test]
+    fn a_damaged_stl_is_read_or_refused(is_binary in any::<bool>(), damage in damage()) {
+        use super::stl::tests::{SQUARE, binary_square};
+        let bytes = if is_binary { binary_square("") } else { SQUARE.as_bytes().to_vec() };
+        let (result, length) = read_damaged("shape.stl", bytes, &damage, super::read);
+        check(result, length)?;
+    }
+
+    #[test]
+    fn a_damaged_off_is_read_or_refused(damage in damage()) {
+        let bytes = super::off::tests::PYRAMID.as_bytes().to_vec();
+        let (result, length) = read_damaged("shape.off", bytes, &damage, super::read);
+        check(result, length)?;
+    }
+
+    #[test]
+    fn a_damaged_cloud_is_read_or_refused(count in any::<bool>(), damage in damage()) {
+        let text = super::cloud::tests::helix(|[x, y, z], [a, b, c]| format!("{x} {y} {z} 1 {a} {b} {c}"));
+        let text = if count { format!("64\n{text}") } else { text };
+        let (result, length) = read_damaged("shape.pts", text.into_bytes(), &damage, super::read);
+        check(result, length)?;
+    }
+
+    #[test]
+    fn a_damaged_glb_is_read_or_refused(as_text in any::<bool>(), damage in damage()) {
+        use super::gltf::tests::{glb, square};
+        use base64::Engine as _;
+        let (mut root, bytes) = square();
+        let (name, file) = if as_text {
+            let data = base64::engine::general_purpose::STANDARD.encode(&bytes);
+            root["buffers"][0]["uri"] = format!("data:;base64,{data}").into();
+            ("shape.gltf", root.to_string().into_bytes())
+        } else {
+            ("shape.glb", glb(&root, &bytes))
+        };
+        let (result, length) = read_damaged(name, file, &damage, super::read);
+        check(result, length)?;
+    }
+
+    #[test]
+    fn a_damaged_array_is_read_or_refused(which in 0..3usize, damage in damage()) {
+        use super::npy::tests::{curve, npy, pyramid};
+        let (name, file) = match which {
+            0 => {
+                let data = curve().into_iter().flatten().flat_map(f64::to_le_bytes);
+                ("shape.npy", npy("<f8", true, "(64, 3)", &data.collect::<Vec<_>>()))
+            }
+            _ => ("shape.npz", pyramid("points", "faces", which == 1)),
+        };
+        let (result, length) = read_damaged(name, file, &damage, super::read);
         check(result, length)?;
     }
 

@@ -10,7 +10,7 @@
 use std::path::Path;
 
 use super::error::ShapeError;
-use super::shape::{Shape, file_length};
+use super::shape::{Shape, file_bytes};
 use crate::geometry::Mesh;
 use crate::geometry::linear::unit;
 
@@ -61,12 +61,7 @@ pub(super) fn words(rest: &[u8]) -> impl Iterator<Item = std::borrow::Cow<'_, st
 
 /// Reads the geometry of an OBJ file.
 pub(super) fn read(path: &Path) -> Result<Shape, ShapeError> {
-    file_length(path)?;
-    let unreadable = |reason| ShapeError::Unreadable {
-        path: path.to_owned(),
-        reason,
-    };
-    let bytes = std::fs::read(path).map_err(unreadable)?;
+    let bytes = file_bytes(path)?;
     let mut vertices = Vec::new();
     let mut vertex_normals = Vec::new();
     let mut polygons = Polygons::default();
@@ -113,14 +108,12 @@ pub(super) fn read(path: &Path) -> Result<Shape, ShapeError> {
     } else {
         polygons.normals_of_vertices(&vertex_normals, &triangles, vertices.len())
     };
-    Ok(Shape {
-        path: path.to_owned(),
-        mesh: Mesh {
-            vertices,
-            triangles,
-            normals,
-        },
-    })
+    let mesh = Mesh {
+        vertices,
+        triangles,
+        normals,
+    };
+    Ok(Shape::at(path, mesh))
 }
 
 /// The first three numbers of a line; what follows (weight, colour) is passed over.

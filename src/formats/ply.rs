@@ -180,14 +180,12 @@ pub(super) fn read(path: &Path) -> Result<Shape, ShapeError> {
         Ok(())
     })?;
     let normals = with_normals.then_some(normals);
-    Ok(Shape {
-        path: path.to_owned(),
-        mesh: Mesh {
-            vertices,
-            triangles,
-            normals,
-        },
-    })
+    let mesh = Mesh {
+        vertices,
+        triangles,
+        normals,
+    };
+    Ok(Shape::at(path, mesh))
 }
 
 /// Whether the elements are those of a shape; true if its vertices have normals.

@@ -13,6 +13,8 @@ pub struct Shape {
     /// Positions in float64, so that georeferenced coordinates survive until normalised; polygons as fans
     /// of triangles, none for a point cloud; the file's normals, if it gives one for each vertex.
     pub mesh: Mesh<f64>,
+    /// What was decided about the contents of the file, one sentence each.
+    pub notes: Vec<String>,
 }
 
 impl Shape {
@@ -26,6 +28,15 @@ impl Shape {
         Self {
             path: PathBuf::from("shape"),
             mesh,
+            notes: Vec::new(),
+        }
+    }
+
+    /// A mesh, or a point cloud, of the file at `path`.
+    pub(crate) fn at(path: &Path, mesh: Mesh<f64>) -> Self {
+        Self {
+            path: path.to_owned(),
+            ..Self::of(mesh)
         }
     }
 
@@ -90,7 +101,7 @@ impl Shape {
 }
 
 /// The length of the file, or why it cannot be read; an empty one is refused here.
-pub(crate) fn file_length(path: &Path) -> Result<u64, ShapeError> {
+pub(super) fn file_length(path: &Path) -> Result<u64, ShapeError> {
     let unreadable = |reason| ShapeError::Unreadable {
         path: path.to_owned(),
         reason,
@@ -105,6 +116,15 @@ pub(crate) fn file_length(path: &Path) -> Result<u64, ShapeError> {
         }),
         length => Ok(length),
     }
+}
+
+/// The whole of a file; an empty one is refused.
+pub(crate) fn file_bytes(path: &Path) -> Result<Vec<u8>, ShapeError> {
+    file_length(path)?;
+    std::fs::read(path).map_err(|reason| ShapeError::Unreadable {
+        path: path.to_owned(),
+        reason,
+    })
 }
 
 /// Adds a polygon as a fan of triangles around its first corner: exact for convex polygons.
@@ -134,7 +154,10 @@ mod tests {
         let cloud = |vertices: Vec<[f64; 3]>| {
             let path = PathBuf::from("cloud.ply");
             let mesh = Mesh::new(vertices, Vec::new());
-            let shape = Shape { path, mesh };
+            let shape = Shape {
+                path,
+                ..Shape::of(mesh)
+            };
             shape.checked().expect_err("refused").to_string()
         };
         assert!(cloud(vec![[1.0; 3]; 12]).contains("12 points, at least 64 needed"));
@@ -149,7 +172,10 @@ mod tests {
         let vertices = vec![[0.0; 3], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]];
         let path = PathBuf::from("line.obj");
         let mesh = Mesh::new(vertices, vec![[0, 1, 2]]);
-        let shape = Shape { path, mesh };
+        let shape = Shape {
+            path,
+            ..Shape::of(mesh)
+        };
         let text = shape.checked().expect_err("refused").to_string();
         assert!(text.starts_with("line.obj: surface area 0"), "{text}");
     }

@@ -356,6 +356,7 @@ impl Shape {
                 .unwrap_or_default()
                 .to_string_lossy()
                 .into(),
+            allowed: ".ply, .obj".to_owned(),
         })?;
         Ok(write_surface(&self.mesh, path, format)?)
     }

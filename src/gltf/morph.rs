@@ -310,5 +310,19 @@ fn linear([r, g, b, opacity]: [f32; 4]) -> [f32; 4] {
     [one(r), one(g), one(b), opacity.clamp(0.0, 1.0)]
 }
 
+/// The way back from [`linear`]: a colour as displays show it.
+pub(crate) fn shown_colour([r, g, b, opacity]: [f32; 4]) -> [f32; 4] {
+    let one = |linear: f32| {
+        // In double precision, so that white stays 1.
+        let linear = f64::from(linear.clamp(0.0, 1.0));
+        let shown = match linear <= 0.003_130_8 {
+            true => linear * 12.92,
+            false => 1.055 * linear.powf(1.0 / 2.4) - 0.055,
+        };
+        shown as f32
+    };
+    [one(r), one(g), one(b), opacity.clamp(0.0, 1.0)]
+}
+
 #[cfg(test)]
 mod tests;

@@ -103,6 +103,7 @@ impl Matching {
                 .iter()
                 .map(|pair| as_stored(pair.confidence))
                 .collect(),
+            notes: Vec::new(),
         }
     }
 

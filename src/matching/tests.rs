@@ -55,6 +55,7 @@ fn cloud(points: &[(Point, Point)], motion: impl Fn(Point) -> Point) -> Shape {
     };
     Shape {
         path: PathBuf::from("body.ply"),
+        notes: Vec::new(),
         mesh: Mesh {
             vertices: points.iter().map(|point| motion(point.0)).collect(),
             triangles: Vec::new(),
@@ -338,7 +339,7 @@ fn pairs_are_read_back_as_they_were_written() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("pairs.csv");
     found.write_csv(&path).expect("written");
-    let read = Correspondences::read_csv(&path, &shape, &shape).expect("read");
+    let read = Correspondences::read(&path, &shape, &shape).expect("read");
     assert_eq!(read, found.correspondences());
     assert!(
         read.pairs.iter().all(|pair| pair[0] == pair[1]),

@@ -61,6 +61,9 @@ fn shape_info(shape: &Shape) -> Result<String> {
             writeln!(text, "volume       {volume:.6}")?;
         }
     }
+    for note in &shape.notes {
+        writeln!(text, "note         {note}")?;
+    }
     Ok(text)
 }
 

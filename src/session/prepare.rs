@@ -76,7 +76,7 @@ fn matched(
 ) -> Result<(Correspondences, Option<Matching>)> {
     let (source, target) = (&shapes[0], &shapes[1]);
     if let Some(path) = stored.filter(|path| path.is_file()) {
-        return Ok((Correspondences::read_csv(path, source, target)?, None));
+        return Ok((Correspondences::read(path, source, target)?, None));
     }
     let options = MatchOptions {
         points: recipe.data.points,

@@ -227,11 +227,11 @@ impl<'a> ReportData<'a> {
         let (source, target) = (&self.shapes[0], &self.shapes[self.shapes.len() - 1]);
         let found = match self.trained.recipe().data.between.first() {
             Some(recipe::Correspondences::File(path)) => {
-                Some(Correspondences::read_csv(path, source, target))
+                Some(Correspondences::read(path, source, target))
             }
             Some(recipe::Correspondences::Match) => {
                 let path = self.trained.folder().pairs();
-                Some(Correspondences::read_csv(&path, source, target))
+                Some(Correspondences::read(&path, source, target))
             }
             Some(recipe::Correspondences::SameVertices) => {
                 Some(Correspondences::same_vertices(source, target))

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::trained::Trained;
 use crate::error::Result;
-use crate::formats::{Shape, read_any, rewrite_vertices};
+use crate::formats::{Shape, carried_extension, read_any, rewrite_vertices};
 use crate::geometry::linear::{difference, length};
 
 /// What was moved.
@@ -25,7 +25,7 @@ impl Trained {
     /// Moves the vertices of a file along the motion from time `from` to time `to`, and writes the file again as
     /// `out`.
     ///
-    /// Where both names have the same ending, all that is not a position stays as it was: faces, edges, cells,
+    /// A PLY or an OBJ under a name of the same ending keeps all that is not a position: faces, edges, cells,
     /// colours, and other elements of a PLY. Else `out`, a PLY or OBJ, has vertices and triangles.
     /// `progress` is given the number of points moved so far.
     ///
@@ -49,8 +49,8 @@ impl Trained {
             mean: ways.iter().sum::<f64>() / ways.len().max(1) as f64,
             longest: ways.into_iter().fold(0.0, f64::max),
         };
-        let ending = |path: &Path| path.extension().map(|text| text.to_ascii_lowercase());
-        if ending(out) == ending(file) {
+        let ending = out.extension().unwrap_or_default();
+        if ending.eq_ignore_ascii_case(carried_extension(file)) {
             rewrite_vertices(file, &moved, out)?;
         } else {
             let mut mesh = shape.mesh;

@@ -23,7 +23,7 @@ use crate::geometry::{Bounds, Mesh, NeighbourSearch};
 /// Where correspondences come from.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum CorrespondenceSource {
-    /// A two-column file of vertex indices.
+    /// A file of pairs, or of a map.
     File(PathBuf),
     /// Vertex i of the source corresponds to vertex i of the target.
     SameVertices,
@@ -193,17 +193,24 @@ pub(crate) fn prepare(shapes: &[Shape], options: &DataOptions) -> Result<Keyfram
     let normalisation = Normalisation::joint(&shapes.iter().collect::<Vec<_>>())?;
     let mut between = Vec::with_capacity(options.between.len());
     let mut confidence = Vec::with_capacity(options.between.len());
+    let mut notes = Vec::new();
     for (k, source) in options.between.iter().enumerate() {
         let rng = Draw::Correspondences(k).generator(options.seed);
-        let known = correspondences(options, source, [&shapes[k], &shapes[k + 1]], rng)?;
+        let known = correspondences(
+            options,
+            source,
+            [&shapes[k], &shapes[k + 1]],
+            rng,
+            &mut notes,
+        )?;
         let place = |(from, to)| (normalisation.apply(from), normalisation.apply(to));
         between.push(known.places.into_iter().map(place).collect());
         confidence.push(known.confidence);
     }
-    let mut notes = Vec::new();
     let mut keys = Vec::with_capacity(shapes.len());
     for (k, (shape, &time)) in shapes.iter().zip(&options.times).enumerate() {
         let mut rng = Draw::Points(k).generator(options.seed);
+        notes.extend(shape.notes.iter().cloned());
         let (points, normals) =
             points_of(shape, options.points, options.normals, &mut rng, &mut notes)?;
         let points = points.into_iter().map(|point| normalisation.apply(point));
@@ -242,13 +249,15 @@ fn correspondences(
     from: &CorrespondenceSource,
     [source, target]: [&Shape; 2],
     mut rng: ChaCha8Rng,
+    notes: &mut Vec<String>,
 ) -> Result<PointPairs, ShapeError> {
     let available = match from {
         CorrespondenceSource::None => return Ok(PointPairs::default()),
-        CorrespondenceSource::File(path) => Correspondences::read_csv(path, source, target)?,
+        CorrespondenceSource::File(path) => Correspondences::read(path, source, target)?,
         CorrespondenceSource::SameVertices => Correspondences::same_vertices(source, target)?,
         CorrespondenceSource::Pairs(known) => known.clone(),
     };
+    notes.extend(available.notes.iter().cloned());
     let points = if source.is_mesh() {
         options.points
     } else {

@@ -9,6 +9,7 @@
 //! | `reconstruct.rs` | a closed mesh from points with normals |
 //! | `normals.rs` | normals of a raw cloud, pointing outwards |
 //! | `correspond.rs` | pairs of vertices that are known to correspond |
+//! | `pairs_file.rs` | files of them |
 //! | `normalise.rs` | the joint frame in which the networks work, and the way back |
 //! | `points.rs` | the points, normals and closed mesh of one shape |
 //! | `keyframes.rs` | all of it in order: shapes in, [`Keyframes`] ready for training out |
@@ -24,6 +25,7 @@ mod far;
 mod keyframes;
 mod normalise;
 mod normals;
+mod pairs_file;
 mod points;
 mod reconstruct;
 mod sample;

@@ -84,7 +84,7 @@ impl Normalisation {
 #[cfg(test)]
 mod tests {
     use std::f64::consts::PI;
-    use std::path::PathBuf;
+    use std::path::Path;
 
     use super::*;
     use crate::geometry::Mesh;
@@ -92,10 +92,7 @@ mod tests {
     use crate::geometry::testing::{sphere_cloud, tetrahedron};
 
     fn shape(mesh: Mesh<f64>) -> Shape {
-        Shape {
-            path: PathBuf::from("shape.ply"),
-            mesh,
-        }
+        Shape::at(Path::new("shape.ply"), mesh)
     }
 
     #[test]

@@ -17,7 +17,9 @@ use super::learned::{Found, Learned};
 use super::trust::{Trust, TrustMap};
 use crate::atomic::write_atomically;
 use crate::cubes::Grid;
-use crate::formats::{self, Shape, SurfaceFormat, rewrite_vertices, write_surface_with};
+use crate::formats::{
+    self, Shape, SurfaceFormat, carried_extension, rewrite_vertices, write_surface_with,
+};
 use crate::geometry::Mesh;
 use crate::gltf::{Precision, Still};
 
@@ -266,10 +268,7 @@ fn carry(
         animation::write_carried(&shape, &times, path, precision, &options.folder)?;
         return Ok(vec![Some(animation::CARRIED.to_owned()); times.len()]);
     }
-    let extension = source
-        .extension()
-        .and_then(|text| text.to_str())
-        .unwrap_or("ply");
+    let extension = carried_extension(source);
     let mut names = vec![None; options.times.len()];
     for (k, moved) in order.into_iter().zip(path) {
         let name = format!("carried-{k:03}.{extension}");

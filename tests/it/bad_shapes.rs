@@ -152,3 +152,59 @@ fn shapes_of_different_vertex_counts_do_not_share_their_vertices() {
         .refused(1, &parts);
     assert!(!place.path("run").exists());
 }
+
+#[test]
+fn malformed_files_of_other_formats_are_refused_with_the_place() {
+    let cases: &[(&str, &[u8], &[&str])] = &[
+        (
+            "a.stl",
+            &[7; 200],
+            &["a.stl: its header claims 117901063 triangles"],
+        ),
+        ("a.stl", b"solid a\nfacet\n", &["a.stl: ", "truncated"]),
+        (
+            "a.off",
+            b"OFF\n3 1 0\n0 0 0\n",
+            &["a.off:4: ", "vertex 1 of 3", "truncated"],
+        ),
+        (
+            "a.xyz",
+            b"1 2 3\n1 2\n",
+            &["a.xyz:2: \"1 2\": 2 columns, 3"],
+        ),
+        (
+            "a.csv",
+            b"1,5;2,5;3,5\n",
+            &["a.csv:1: \"1,5\" is not a number"],
+        ),
+        (
+            "a.npy",
+            b"\x93NUMPY\x02\0\xff\xff\xff\xff",
+            &["a.npy: ", "4294967295 bytes"],
+        ),
+        ("a.npz", b"PK\x03\x04", &["a.npz: ", "archive"]),
+        (
+            "a.glb",
+            b"glTF\x02\0\0\0\xff\xff\xff\xff",
+            &["a.glb: ", "truncated"],
+        ),
+        (
+            "a.gltf",
+            b"{\"asset\": {\"version\": \"2.0\"}",
+            &["a.gltf: its JSON: "],
+        ),
+        (
+            "a.step",
+            b"hello",
+            &[
+                "a.step: unknown kind of shape",
+                ".ply, .obj, .stl, .off, .glb",
+            ],
+        ),
+    ];
+    for (name, content, parts) in cases {
+        let place = Workplace::tiny(&[]);
+        place.write(name, content);
+        place.isomorph(&["info", name]).refused(1, parts);
+    }
+}

@@ -81,3 +81,14 @@ fn a_shape_without_any_is_its_geometry() {
     assert_eq!(found.parts[0].triangles, [[0, 1, 2]]);
     assert_eq!((found.colours, found.texture), (None, None));
 }
+
+#[test]
+fn a_cloud_in_text_gives_its_colours_and_an_stl_nothing() {
+    let cloud = crate::formats::cloud::tests::helix(|[x, y, z], _| format!("{x},{y},{z},255,51,0"));
+    let found = read(&[("cloud.csv", cloud.as_bytes())]);
+    assert_eq!(found.colours.expect("colours")[63], [1.0, 0.2, 0.0, 1.0]);
+    let square = crate::formats::stl::tests::SQUARE;
+    let found = read(&[("square.stl", square.as_bytes())]);
+    assert_eq!((found.origin.len(), found.colours), (4, None));
+    assert_eq!(found.parts[0].triangles, [[0, 1, 2], [0, 2, 3]]);
+}

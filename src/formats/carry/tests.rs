@@ -156,3 +156,20 @@ fn a_file_can_be_carried_onto_itself() {
         STANDING
     );
 }
+
+#[test]
+fn other_formats_are_carried_as_ply() {
+    let square = crate::formats::stl::tests::SQUARE;
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("square.STL");
+    std::fs::write(&path, square).expect("written");
+    assert_eq!(carried_extension(&path), "ply");
+    let out = folder.path().join("carried-000.ply");
+    rewrite_vertices(&path, &STANDING, &out).expect("carried");
+    let moved = crate::formats::read(&out).expect("read").mesh;
+    assert_eq!(moved.vertices, STANDING);
+    assert_eq!(moved.triangles, [[0, 1, 2], [0, 2, 3]]);
+    let refused = rewrite_vertices(&path, &STANDING, &folder.path().join("a.stl"));
+    let text = refused.expect_err("another format").to_string();
+    assert!(text.ends_with("end the name in .ply"), "{text}");
+}

@@ -128,6 +128,17 @@ fn pairs_from_a_file_are_used_up_to_the_fraction() {
     let (from, to) = places(pair.between[0][1]);
     assert_eq!((round(from), round(to)), ([1.0, 0.0, 0.0], [0.0, 0.0, 2.0]));
     assert_eq!(pair.between[0].len(), 3);
+    let one_based = files.folder.path().join("map.txt");
+    std::fs::write(&one_based, "1\n4\n3\n2\n").expect("written");
+    files.options.between = vec![CorrespondenceSource::File(one_based)];
+    let mapped = files.prepared();
+    assert_eq!(mapped.between[0].len(), 4);
+    assert_eq!(mapped.between[0][1], pair.between[0][1]);
+    assert!(
+        mapped.notes[0].contains("map.txt: no vertex is 0 and one"),
+        "{:?}",
+        mapped.notes
+    );
     files.options.correspondence_fraction = 0.002;
     assert_eq!(files.prepared().between[0].len(), 2);
     for fraction in [0.0, -1.0, f64::NAN] {

@@ -124,7 +124,7 @@ pub(super) static KEYFRAME: [Key; 3] = [
     Key {
         section: "data.keyframe",
         field: "file",
-        doc: "The shape: a PLY or OBJ file.",
+        doc: "The shape: PLY, OBJ, STL, OFF, glTF, NPY, or points in text.",
         rule: Rule::path(),
         columns: ["_"; 5],
     },

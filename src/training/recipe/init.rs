@@ -26,7 +26,7 @@ const FIRST: [(&str, &str); 10] = [
         "data.correspondences",
         "Known pairs of points. A few decide where parts go, above all in large motions. \"none\": no \
          pairs. \"same-vertices\": vertices of equal number are pairs. \"match\": isomorph finds \
-         pairs before training, which takes a few seconds. A path: a CSV file with \
+         pairs before training, which takes a few seconds. A path: a file with \
          source_index,target_index on each line.",
     ),
     (

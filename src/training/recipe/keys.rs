@@ -58,8 +58,8 @@ pub(crate) static SECTIONS: [&Section; 7] = [
 section! {
     /// The shapes, and which of their points correspond.
     data: DataKeys {
-        /// Shape at time 0, PLY or OBJ. The path is relative to this recipe. A mesh is sampled, a
-        /// point cloud is used as it is.
+        /// Shape at time 0: PLY, OBJ, STL, OFF, glTF, NPY, or points in text. The path is relative to this
+        /// recipe. A mesh is sampled, a point cloud is used as it is.
         source: Option<PathBuf> = _ | _ | _ | _ | _, Rule::path();
         /// Shape at time 1.
         target: Option<PathBuf> = _ | _ | _ | _ | _, Rule::path();
@@ -69,8 +69,8 @@ section! {
         /// The frames of the sequence that are key frames, counted from 0, in ascending order.
         keys: Option<Vec<f64>> = _ | _ | _ | _ | _, Rule::list(0.0, MANY as f64);
         /// Known correspondences. "none": no pairs. "same-vertices": vertices of equal number are
-        /// pairs. "match": isomorph finds pairs before training. A path: a CSV file with
-        /// source_index,target_index on each line.
+        /// pairs. "match": isomorph finds pairs before training. A path: a file with
+        /// source_index,target_index on each line, or an array of numpy; one column is a map.
         correspondences: Correspondences = "none" | "none" | "none" | "none" | "none",
             Rule::word_or_path(Correspondences::WORDS);
         /// Points sampled on each mesh. The paper uses 20000.

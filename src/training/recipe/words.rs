@@ -180,7 +180,7 @@ pub enum Correspondences {
     SameVertices,
     /// Pairs that are found before training, from the shapes alone.
     Match,
-    /// The pairs `source_index,target_index` of a CSV file.
+    /// The pairs, or the map, of a file.
     File(PathBuf),
 }
 
