@@ -26,6 +26,9 @@ pub struct FieldGrid {
     pub has_velocity: bool,
 }
 
+/// Numbers at places at a time, normalised.
+type Values<'a> = dyn Fn(&[[f32; 3]], f64) -> Vec<f32> + 'a;
+
 impl Trained {
     /// Writes `f` and `V` at the nodes of a grid over the box of the run, as a `.npz` archive of 32-bit arrays in
     /// the coordinates and the unit of the shapes:
@@ -77,7 +80,7 @@ impl Trained {
         let all = count * times.len() * if motion.is_some() { 2 } else { 1 };
         let mut done = 0;
         let own = |value: f32| learned.normalisation.invert_length(f64::from(value)) as f32;
-        let mut each = |out: &mut dyn Write, values: &dyn Fn(&[[f32; 3]], f64) -> Vec<f32>| {
+        let mut each = |out: &mut dyn Write, values: &Values<'_>| {
             for &time in times {
                 for chunk in places.chunks(AT_A_TIME) {
                     let found = values(chunk, time).into_iter().map(own);

@@ -59,18 +59,17 @@ impl Correspondences {
         let found = if is_array {
             Rows::of_arrays(path)?
         } else {
-            Rows::of_text(path)?
+            Rows::of_text(path, &file_bytes(path)?)?
         };
         found.resolve(path, [source, target])
     }
 }
 
 impl Rows {
-    fn of_text(path: &Path) -> Result<Self, ShapeError> {
-        let bytes = file_bytes(path)?;
+    fn of_text(path: &Path, bytes: &[u8]) -> Result<Self, ShapeError> {
         let mut found = Self::default();
         let mut names_allowed = true;
-        for (at, line) in lines(&bytes) {
+        for (at, line) in lines(bytes) {
             if let Some(comment) = line.strip_prefix('#') {
                 let is = |first: u64| {
                     comment
