@@ -34,7 +34,19 @@ impl Correspondences {
             reason,
         };
         let bytes = std::fs::read(path).map_err(unreadable)?;
-        let text = String::from_utf8_lossy(&bytes);
+        Self::parse_csv(&String::from_utf8_lossy(&bytes), path, source, target)
+    }
+
+    /// The pairs in the text of such a file; `path` opens the messages.
+    ///
+    /// # Errors
+    /// Those of [`Self::read_csv`], but for the file itself.
+    pub(crate) fn parse_csv(
+        text: &str,
+        path: &Path,
+        source: &Shape,
+        target: &Shape,
+    ) -> Result<Self, ShapeError> {
         let (mut pairs, mut confidence) = (Vec::new(), Vec::new());
         let mut names_allowed = true;
         for (at, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
@@ -81,6 +93,14 @@ impl Correspondences {
                 Vec::new()
             },
         })
+    }
+
+    /// No pair at all.
+    pub(crate) fn none() -> Self {
+        Self {
+            pairs: Vec::new(),
+            confidence: Vec::new(),
+        }
     }
 
     /// Every vertex of the source corresponds to the target's vertex of the same index.
