@@ -86,7 +86,7 @@ pub mod correspondence {
     pub use crate::matching::{
         Coverage, Cycle, MatchOptions, MatchedPair, Matching, Quantiles, Rigid,
     };
-    pub use crate::session::pairs::find;
+    pub use crate::session::pairs::{find, find_from};
 }
 
 /// Corresponding vertices of two shapes, picked by hand on a page in the browser.
