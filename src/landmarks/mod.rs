@@ -74,7 +74,7 @@ impl Picker {
     /// # Errors
     /// What the file system says; the message names the file.
     pub fn write_page(&self, path: &Path) -> Result<()> {
-        let html = self.html(false);
+        let html = self.html(self.given.clone(), false);
         write_atomically(path, |out| out.write_all(html.as_bytes()))?;
         Ok(())
     }
@@ -87,7 +87,8 @@ impl Picker {
         Served::new(self)
     }
 
-    fn html(&self, served: bool) -> String {
+    /// The page with these pairs to begin with.
+    fn html(&self, given: Option<String>, served: bool) -> String {
         let name = |path: &Path| {
             let name = path.file_name().unwrap_or(path.as_os_str());
             name.to_string_lossy().into_owned()
@@ -96,7 +97,7 @@ impl Picker {
             names: [0, 1].map(|side| name(&self.shapes[side].path)),
             meshes: [0, 1].map(|side| &self.shapes[side].mesh),
             output: name(&self.output),
-            given: self.given.clone(),
+            given,
             served,
         }
         .html()

@@ -10,10 +10,10 @@
 //! is refused: that is how a page elsewhere would reach this one under a name of its own. One that comes from another
 //! page is refused by its `Origin`.
 
-use std::io::BufReader;
-use std::net::{Ipv4Addr, TcpListener, TcpStream};
-use std::sync::Arc;
+use std::io::{BufReader, Read};
+use std::net::{Ipv4Addr, Shutdown, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use super::Picker;
@@ -29,6 +29,9 @@ const MOST_CONNECTIONS: usize = 32;
 
 /// How long a connection may say nothing.
 const PATIENCE: Duration = Duration::from_secs(10);
+
+/// How long the other end of an answered connection may take to close it.
+const LINGER: Duration = Duration::from_millis(500);
 
 /// How often a new connection or a stop is looked for.
 const PAUSE: Duration = Duration::from_millis(20);
@@ -48,7 +51,8 @@ pub struct Served {
 #[derive(Debug)]
 struct Site {
     picker: Picker,
-    page: String,
+    /// The pairs that the page begins with: those given, then those saved last, so that it may be loaded again.
+    pairs: Mutex<Option<String>>,
     secret: String,
     /// How many pairs the file has that was saved last, or [`NOTHING`].
     saved: AtomicUsize,
@@ -66,7 +70,7 @@ impl Served {
             port: listener.local_addr()?.port(),
             listener,
             site: Arc::new(Site {
-                page: picker.html(true),
+                pairs: Mutex::new(picker.given.clone()),
                 picker,
                 secret: bits.iter().map(|byte| format!("{byte:02x}")).collect(),
                 saved: AtomicUsize::new(NOTHING),
@@ -137,7 +141,10 @@ impl Site {
         let head = match Head::read(&mut incoming) {
             Ok(Some(head)) => head,
             Ok(None) => return Ok(()),
-            Err(refusal) => return refusal.write(&mut &stream),
+            Err(refusal) => {
+                refusal.write(&mut &stream)?;
+                return end(&stream);
+            }
         };
         let answer = self.answer(&head, &mut incoming);
         let (Ok(answer) | Err(answer)) = answer;
@@ -146,15 +153,11 @@ impl Site {
         if head.method == "POST" && answer.status == OK && head.path.ends_with("/done") {
             self.done.store(true, Ordering::SeqCst);
         }
-        Ok(())
+        end(&stream)
     }
 
     /// The answer; what is refused is an error.
-    fn answer(
-        &self,
-        head: &Head,
-        incoming: &mut impl std::io::Read,
-    ) -> std::result::Result<Answer, Answer> {
+    fn answer(&self, head: &Head, incoming: &mut impl Read) -> std::result::Result<Answer, Answer> {
         let host = head.header("host").unwrap_or_default();
         if !is_this_machine(host) {
             let text = "this address is of 127.0.0.1 and localhost alone";
@@ -167,7 +170,7 @@ impl Site {
                 return Ok(Answer {
                     status: OK,
                     kind: "text/html; charset=utf-8",
-                    body: self.page.clone().into_bytes(),
+                    body: self.picker.html(self.pairs().clone(), true).into_bytes(),
                 });
             }
             ("POST", "pairs" | "done") => {}
@@ -191,7 +194,12 @@ impl Site {
         let count = self.picker.save(&text);
         let count = count.map_err(|error| refused(error.to_string()))?;
         self.saved.store(count, Ordering::SeqCst);
+        *self.pairs() = Some(text);
         Ok(Answer::text(OK, count.to_string()))
+    }
+
+    fn pairs(&self) -> MutexGuard<'_, Option<String>> {
+        self.pairs.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// What follows the secret in a path, if it is the right one.
@@ -205,6 +213,15 @@ impl Site {
 }
 
 const OK: &str = "200 OK";
+
+/// Ends a connection. What was sent and not read is read first: a system resets a connection that is closed with such
+/// bytes, and the answer may be lost.
+fn end(stream: &TcpStream) -> std::io::Result<()> {
+    stream.shutdown(Shutdown::Write)?;
+    stream.set_read_timeout(Some(LINGER))?;
+    std::io::copy(&mut stream.take(MOST_PAIRS as u64), &mut std::io::sink())?;
+    Ok(())
+}
 
 /// Whether a `Host` is this machine, at any port: one that is passed on by `ssh -L` has another number.
 fn is_this_machine(host: &str) -> bool {

@@ -46,8 +46,14 @@ fn offered(picker: Picker, asks: impl FnOnce(u16, &str)) -> Result<Option<usize>
     let stop = StopFlag::default();
     std::thread::scope(|scope| {
         let waiting = scope.spawn(|| served.wait(&stop));
-        asks(served.port(), path);
+        // The wait ends too where a check fails.
+        let asked = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+            asks(served.port(), path);
+        }));
         stop.set();
+        if let Err(failed) = asked {
+            std::panic::resume_unwind(failed);
+        }
         waiting.join().expect("no panic")
     })
 }
@@ -99,6 +105,10 @@ fn the_page_is_given_and_pairs_are_written_whole_or_not_at_all() {
             "{answer}"
         );
         assert_eq!(std::fs::read_to_string(&output).expect("written"), text);
+        // Loaded again, the page has them.
+        let host = format!("127.0.0.1:{port}");
+        let page = asked(port, &format!("GET {path}"), &host, "", "");
+        assert!(page.contains(r##"# name: left ear\n0,119\n99,3\n""##));
         // What is no file of pairs changes nothing.
         for (bad, why) in [
             ("0,1\n100,1\n", "pairs.csv:2: vertex 100 of "),
