@@ -3,39 +3,20 @@
 //   node scripts/viewer_test.mjs RUN/report.html [FOLDER FOR PICTURES]
 //
 // Nothing is loaded from outside, nothing is written to the console, scrubbing and each button change the picture, keys
-// do what the buttons do, a picture and a video are saved, and both themes are drawn. Chromium is the system's, or that
-// of the variable CHROMIUM; puppeteer-core is installed by `npm ci` in src/viewer/web.
+// do what the buttons do, a picture and a video are saved, and both themes are drawn.
 import assert from 'node:assert/strict';
 import { createHash } from 'node:crypto';
 import fs from 'node:fs';
-import { createRequire } from 'node:module';
 import os from 'node:os';
 import path from 'node:path';
 import { pathToFileURL } from 'node:url';
 
-const packages = createRequire(new URL('../src/viewer/web/package.json', import.meta.url));
-const { default: puppeteer } = await import(pathToFileURL(packages.resolve('puppeteer-core')).href);
+import { check, conclude, launch } from './browser.mjs';
 
 const [file, pictures] = process.argv.slice(2);
 const address = pathToFileURL(path.resolve(file)).href;
 const saved = fs.mkdtempSync(path.join(os.tmpdir(), 'isomorph-viewer-'));
-const browser = await puppeteer.launch({
-  executablePath: process.env.CHROMIUM || '/usr/bin/chromium',
-  // Without a GPU, WebGL is computed by SwiftShader.
-  args: ['--no-sandbox', '--disable-dev-shm-usage', '--hide-scrollbars', '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader'],
-  defaultViewport: { width: 1280, height: 800 },
-});
-
-let failed = 0;
-async function check(words, test) {
-  try {
-    await test();
-    console.log(`ok: ${words}`);
-  } catch (error) {
-    failed++;
-    console.log(`FAILED: ${words}: ${error.message}`);
-  }
-}
+const browser = await launch();
 
 try {
   const page = await browser.newPage();
@@ -219,5 +200,4 @@ try {
   await browser.close();
   fs.rmSync(saved, { recursive: true, force: true });
 }
-console.log(failed ? `${failed} checks failed` : 'all checks passed');
-process.exit(failed ? 1 : 0);
+conclude();

@@ -22,10 +22,7 @@ pub(crate) fn write_atomically(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> io::Result<()> {
-    let folder = match path.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
+    let folder = folder_of(path);
     let whole = || -> io::Result<()> {
         std::fs::create_dir_all(folder)?;
         let temporary = tempfile::Builder::new()
@@ -40,7 +37,38 @@ pub(crate) fn write_atomically(
         temporary.persist(path).map_err(|refused| refused.error)?;
         Ok(())
     };
-    whole().map_err(|error| io::Error::new(error.kind(), format!("{}: {error}", path.display())))
+    whole().map_err(|error| naming(path, &error))
+}
+
+/// Whether [`write_atomically`] could write this file now, so that long work does not begin in vain. The parent
+/// directory is created if it is missing.
+///
+/// # Errors
+/// What the file system says, or that `path` is a folder; the message names `path`.
+pub(crate) fn check_writable(path: &Path) -> io::Result<()> {
+    let folder = folder_of(path);
+    let tried = || -> io::Result<()> {
+        if path.is_dir() {
+            return Err(io::Error::other("is a folder, not a file"));
+        }
+        std::fs::create_dir_all(folder)?;
+        let mut probe = tempfile::Builder::new();
+        probe.prefix(TEMPORARY).tempfile_in(folder).map(drop)
+    };
+    tried().map_err(|error| naming(path, &error))
+}
+
+/// The folder that a file lies in.
+fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    }
+}
+
+/// The same error with the file's name before it.
+fn naming(path: &Path, error: &io::Error) -> io::Error {
+    io::Error::new(error.kind(), format!("{}: {error}", path.display()))
 }
 
 /// Temporary files are private to their owner; a result is an ordinary file.
@@ -78,5 +106,20 @@ mod tests {
             .expect("a folder")
             .count();
         assert_eq!(left, 1, "the temporary file is gone");
+    }
+
+    #[test]
+    fn what_can_be_written_is_known_before_and_leaves_nothing() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("new/result.txt");
+        check_writable(&path).expect("it can be written");
+        let parent = path.parent().expect("a parent");
+        assert_eq!(std::fs::read_dir(parent).expect("made").count(), 0);
+        std::fs::write(folder.path().join("file"), "").expect("written");
+        for (place, why) in [("new", "is a folder"), ("file/result.txt", "result.txt: ")] {
+            let refused = check_writable(&folder.path().join(place));
+            let message = refused.expect_err("refused").to_string();
+            assert!(message.contains(why), "{message}");
+        }
     }
 }

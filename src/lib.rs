@@ -23,7 +23,7 @@
 //! | [`Event`] | what is reported while work goes on; front ends show it |
 //! | [`Backend`] | where networks are trained and evaluated, chosen by value |
 //! | [`Error`] | one type for all that can go wrong; its [`ErrorKind`] decides the exit status |
-//! | [`correspondence`], [`normals`], [`evaluation`], [`comparison`], [`benchmark`] | pairs and normals found; runs, methods and machines measured |
+//! | [`correspondence`], [`picking`], [`normals`], [`evaluation`], [`comparison`], [`benchmark`] | pairs found or picked, normals found; runs, methods and machines measured |
 //! | [`guide`] | the guide: first steps, recipes, results, method, design |
 //!
 //! The command line is one front end of this library and uses nothing else.
@@ -42,6 +42,7 @@ mod formats;
 mod geometry;
 mod gltf;
 mod kinds;
+mod landmarks;
 mod matching;
 mod memory;
 mod picture;
@@ -89,7 +90,12 @@ pub mod correspondence {
     pub use crate::matching::{
         Coverage, Cycle, MatchOptions, MatchedPair, Matching, Quantiles, Rigid,
     };
-    pub use crate::session::pairs::find;
+    pub use crate::session::pairs::{find, find_from};
+}
+
+/// Corresponding vertices of two shapes, picked by hand on a page in the browser.
+pub mod picking {
+    pub use crate::landmarks::{Picker, Served};
 }
 
 /// Normals of a raw point cloud, all pointing out of the shape.

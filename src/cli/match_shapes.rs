@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use isomorph::Shape;
-use isomorph::correspondence::{MatchOptions, Matching, Rigid, find};
+use isomorph::correspondence::{MatchOptions, Matching, Rigid, find, find_from};
 use serde::Serialize;
 
-use super::{Failure, QuietArgs, Result, print};
+use super::{Failure, QuietArgs, Result, is_same_file, print};
 
 /// Find pairs of corresponding points of two shapes
 ///
@@ -29,6 +29,10 @@ pub(super) struct MatchArgs {
     /// Output file with lines of source_index,target_index,confidence
     #[arg(long, short, value_name = "FILE", default_value = "pairs.csv")]
     output: PathBuf,
+
+    /// Pairs that are known, such as those of `isomorph pick`: the search follows them, and they are kept
+    #[arg(long, value_name = "FILE")]
+    pairs: Option<PathBuf>,
 
     /// Keep at most this many pairs, spread evenly over the source [default: all]
     #[arg(long, value_name = "N")]
@@ -78,6 +82,13 @@ pub(super) fn run(args: MatchArgs) -> Result {
             "--picture {path}: must end in .svg"
         )));
     }
+    let given = args.pairs.as_ref();
+    if given.is_some_and(|given| is_same_file(given, &args.output)) {
+        let path = args.output.display();
+        return Err(Failure::Usage(format!(
+            "{path}: holds the given pairs, which the result would replace; choose another file with -o"
+        )));
+    }
     let options = MatchOptions {
         points: args.points,
         nodes: args.nodes,
@@ -88,7 +99,11 @@ pub(super) fn run(args: MatchArgs) -> Result {
     };
     let (source, target) = (Shape::read(&args.source)?, Shape::read(&args.target)?);
     let mut terminal = args.quiet.terminal(&args.output);
-    let matching = find(&source, &target, &options, |event| terminal.show(event))?;
+    let show = |event: &isomorph::Event| terminal.show(event);
+    let matching = match &args.pairs {
+        Some(given) => find_from(&source, &target, given, &options, show)?,
+        None => find(&source, &target, &options, show)?,
+    };
     matching.write_pairs(&args.output)?;
     if let Some(path) = &args.picture {
         matching.write_picture(path)?;
@@ -134,6 +149,13 @@ fn text(found: &Matching, args: &MatchArgs) -> String {
         args.confidence,
         args.output.display()
     );
+    if found.given > 0 {
+        let _ = writeln!(
+            text,
+            "given        {} of them, kept as they are",
+            found.given
+        );
+    }
     let coverage = &found.coverage;
     let _ = writeln!(
         text,

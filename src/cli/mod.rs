@@ -23,6 +23,7 @@ mod match_shapes;
 mod morph;
 mod new_run;
 mod normals;
+mod pick;
 mod resume;
 mod terminal;
 mod train;
@@ -30,6 +31,7 @@ mod view;
 mod warp;
 
 use std::io::{self, Write};
+use std::path::Path;
 use std::process::ExitCode;
 use std::sync::OnceLock;
 
@@ -69,6 +71,7 @@ enum Command {
     Evaluate(evaluate::EvaluateArgs),
     Compare(compare::CompareArgs),
     Match(match_shapes::MatchArgs),
+    Pick(pick::PickArgs),
     Normals(normals::NormalsArgs),
     Init(init::InitArgs),
     Info(info::InfoArgs),
@@ -119,7 +122,7 @@ struct QuietArgs {
 
 impl QuietArgs {
     /// What shows the events of the run in this folder.
-    fn terminal(self, run: &std::path::Path) -> Terminal {
+    fn terminal(self, run: &Path) -> Terminal {
         Terminal::new(run, self.quiet)
     }
 }
@@ -211,6 +214,7 @@ pub(crate) fn run(cli: Cli) -> ExitCode {
         Command::Evaluate(args) => evaluate::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Match(args) => match_shapes::run(args),
+        Command::Pick(args) => pick::run(args),
         Command::Normals(args) => normals::run(args),
         Command::Init(args) => init::run(args),
         Command::Info(args) => info::run(args),
@@ -228,6 +232,11 @@ fn print(text: &str) -> Result {
     out.write_all(text.as_bytes())
         .and_then(|()| out.flush())
         .map_err(Failure::Output)
+}
+
+/// Whether two paths lead to one file that is there.
+fn is_same_file(one: &Path, other: &Path) -> bool {
+    matches!((one.canonicalize(), other.canonicalize()), (Ok(one), Ok(other)) if one == other)
 }
 
 /// A flag that Ctrl-C or a request to terminate sets; a second one ends the process at once.

@@ -1,5 +1,6 @@
 //! `isomorph view`: a run as a page in the browser.
 
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -60,13 +61,17 @@ pub(super) fn run(args: ViewArgs) -> Result {
 
 /// Opens a page in the browser, or says in a line why not.
 pub(super) fn show(page: &Path) {
-    let refused = match has_display() {
-        true => open::that(page).err().map(|reason| reason.to_string()),
-        false => Some("this machine has no display".to_owned()),
-    };
-    if let Some(reason) = refused {
+    if let Some(reason) = open_in_browser(page.as_os_str()) {
         let page = page.display();
         eprintln!("no browser was opened ({reason}); open {page} in one, on any machine");
+    }
+}
+
+/// Opens a file or an address in the browser, or returns why that is not possible.
+pub(super) fn open_in_browser(place: &OsStr) -> Option<String> {
+    match has_display() {
+        true => open::that(place).err().map(|reason| reason.to_string()),
+        false => Some("this machine has no display".to_owned()),
     }
 }
 

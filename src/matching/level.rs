@@ -75,6 +75,13 @@ impl Level {
         spacing(self.nodes.len())
     }
 
+    /// The node that carries an element most.
+    pub(super) fn carrier(&self, element: u32) -> u32 {
+        let carriers = self.carriers.of(element).iter();
+        let most = carriers.max_by(|a, b| a.1.total_cmp(&b.1));
+        most.expect("each element is carried").0
+    }
+
     /// Where `x`, beside element `anchor`, goes with the nodes: the mean of the motions of those
     /// that carry the anchor; and the mean of their rotations, of the normal.
     pub(super) fn carry(

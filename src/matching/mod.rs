@@ -10,6 +10,7 @@
 //! | `surface.rs` | 20,000 points on a shape, how remote each of its nodes is |
 //! | `level.rs` | 1,500 nodes among the points, which they carry, and a quarter of them, which carry the others |
 //! | `graph.rs` | distances along a surface, which keep near sheets apart |
+//! | `anchors.rs` | pairs that are given, which hold the registration |
 //! | `rigid.rs` | the rigid motion to begin with, where the shapes are not in one frame |
 //! | `assignment.rs` | which node belongs to which, softly and in both directions at once |
 //! | `affinity.rs`, `sparse.rs` | how alike two points are, and matrices of such numbers without the zeros |
@@ -43,6 +44,7 @@
 //! normals say; find what turns by more than about a right angle and has no limb to hold on to.
 
 mod affinity;
+mod anchors;
 mod assignment;
 mod cells;
 mod elastic;
@@ -63,6 +65,7 @@ mod system;
 use std::time::Instant;
 
 use rayon::prelude::*;
+use rustc_hash::FxHashSet;
 
 pub(crate) use error::MatchError;
 pub use options::MatchOptions;
@@ -72,7 +75,8 @@ pub(crate) use rotation::RigidMotion;
 pub use stage::MatchStage;
 pub(crate) use stage::Report;
 
-use crate::shape::{Normalisation, Shape};
+use crate::shape::{Correspondences, Normalisation, Shape};
+use anchors::{Anchors, Holds};
 use level::NodeMotion;
 use pairs::{Laid, Sites};
 use register::{Registration, WIDTHS};
@@ -84,7 +88,9 @@ pub(crate) const COVERAGE_RADIUS: f64 = 0.05;
 
 /// Finds the vertices of two shapes that belong together.
 ///
-/// The same shapes and options give the same pairs, whatever the number of cores. `report` is called
+/// `given` are pairs that are known: the search follows them, and the result holds them as they are.
+///
+/// The same shapes, given pairs and options give the same pairs, whatever the number of cores. `report` is called
 /// as each stage begins, on its way and as it ends.
 ///
 /// # Errors
@@ -93,6 +99,7 @@ pub(crate) const COVERAGE_RADIUS: f64 = 0.05;
 pub(crate) fn match_shapes(
     source: &Shape,
     target: &Shape,
+    given: &Correspondences,
     options: &MatchOptions,
     report: &mut Report<'_>,
 ) -> Result<Matching, MatchError> {
@@ -109,17 +116,18 @@ pub(crate) fn match_shapes(
     let (from, to) = (from?, to?);
     report(MatchStage::Surfaces, 1, 1);
     report(MatchStage::Alignment, 0, 1);
+    let anchors = Anchors::new(shapes, &given.pairs, &frame);
     let alignment = match options.aligned {
         true => rigid::as_given(&from, &to),
-        false => rigid::align(&from, &to),
+        false => rigid::align(&from, &to, &anchors),
     };
     report(MatchStage::Alignment, 1, 1);
-    let [there, back] = register_both(&from, &to, &alignment.motion, report);
+    let [there, back] = register_both([&from, &to], &anchors, &alignment.motion, report);
     report(MatchStage::Pairs, 0, 1);
     let laid = [(&from, &there), (&to, &back)].map(|(surface, motion)| Laid { surface, motion });
     let found = mutual_pairs(shapes, laid, &frame);
     let mutual = found.len();
-    let pairs = kept(found, source, &frame, options);
+    let pairs = kept(found, given, source, &frame, options);
     if pairs.is_empty() {
         return Err(MatchError::NoPairs {
             source_path: source.path.clone(),
@@ -131,6 +139,7 @@ pub(crate) fn match_shapes(
     let targets = places(target, pairs.iter().map(|pair| pair.target), &frame);
     let matching = Matching {
         mutual,
+        given: given.pairs.len(),
         coverage: Coverage {
             radius: COVERAGE_RADIUS,
             source: pairs::coverage(&from, &sources, COVERAGE_RADIUS),
@@ -152,16 +161,22 @@ pub(crate) fn match_shapes(
 /// The motions there and back: those from each width until all have come near, then the two that
 /// agree best, in the end each with the other.
 fn register_both(
-    source: &Surface,
-    target: &Surface,
+    [source, target]: [&Surface; 2],
+    anchors: &Anchors,
     start: &RigidMotion,
     report: &mut Report<'_>,
 ) -> [NodeMotion; 2] {
     let steps = Registration::STEPS + Registration::FINE_STEPS;
     let mut report = |done| report(MatchStage::Registration, done, steps);
-    let ways = [(source, target, *start), (target, source, start.inverse())];
-    let [mut there, mut back] = ways
-        .map(|(from, to, start)| WIDTHS.map(|width| Registration::new([from, to], &start, width)));
+    let held = [(anchors, source), (&anchors.reversed(), target)];
+    let held = held.map(|(anchors, surface)| Holds::new(anchors, surface));
+    let ways = [
+        ([source, target], *start, &held[0]),
+        ([target, source], start.inverse(), &held[1]),
+    ];
+    let [mut there, mut back] = ways.map(|(surfaces, start, held)| {
+        WIDTHS.map(|width| Registration::new(surfaces, &start, width, held))
+    });
     for step in 0..Registration::STEPS {
         report(step);
         let all = there.par_iter_mut().chain(&mut back);
@@ -208,15 +223,23 @@ fn mutual_pairs(
 }
 
 /// The pairs that the options ask for: sure enough, and if that is too many, spread over the
-/// source.
+/// source. Given ones take the place of those that share a vertex with them, and all are kept.
 fn kept(
     mut pairs: Vec<MatchedPair>,
+    given: &Correspondences,
     source: &Shape,
     frame: &Normalisation,
     options: &MatchOptions,
 ) -> Vec<MatchedPair> {
-    pairs.retain(|pair| pair.confidence >= options.least_confidence);
-    if let Some(count) = options.count
+    let taken = [0, 1].map(|side| FxHashSet::from_iter(given.pairs.iter().map(|pair| pair[side])));
+    pairs.retain(|pair| {
+        let is_free = !taken[0].contains(&pair.source) && !taken[1].contains(&pair.target);
+        is_free && pair.confidence >= options.least_confidence
+    });
+    let count = options
+        .count
+        .map(|count| count.saturating_sub(given.pairs.len()));
+    if let Some(count) = count
         && count < pairs.len()
     {
         let places = places(source, pairs.iter().map(|pair| pair.source), frame);
@@ -227,6 +250,13 @@ fn kept(
             .map(|kept| pairs[kept as usize])
             .collect();
     }
+    let as_given = |(k, &[source, target]): (usize, &[u32; 2])| MatchedPair {
+        source,
+        target,
+        confidence: given.confidence.get(k).map_or(1.0, |&sure| sure.into()),
+    };
+    pairs.extend(given.pairs.iter().enumerate().map(as_given));
+    pairs.sort_by_key(|pair| pair.source);
     pairs
 }
 

@@ -17,6 +17,8 @@ pub struct Matching {
     pub pairs: Vec<MatchedPair>,
     /// How many mutual nearest neighbours there were, sure or not.
     pub mutual: usize,
+    /// How many pairs were given, which are among those kept.
+    pub given: usize,
     /// The share of each surface that has a matched vertex near it.
     pub coverage: Coverage,
     /// How far points come back from where they began.

@@ -6,6 +6,7 @@ use std::num::NonZeroUsize;
 use rayon::prelude::*;
 
 use super::affinity::{Likeness, Marks};
+use super::anchors::Holds;
 use super::assignment::{pulls, sliding};
 use super::elastic::{ElasticNodes, Pull, Stiffness};
 use super::level::{Level, NodeMotion};
@@ -33,7 +34,7 @@ const GIVE: [f64; 2] = [1.5, 0.15];
 const SLIDE: [f64; 2] = [0.3, 0.05];
 
 /// Resistance of a tie as long as the spacing of the nodes.
-const STIFFNESS: f64 = 1.0;
+pub(super) const STIFFNESS: f64 = 1.0;
 
 /// Weight of the angle between normals: opposite ones count as `exp(-8)`.
 const NORMALS: f64 = 4.0;
@@ -73,6 +74,8 @@ pub(super) struct Registration<'a> {
     /// How many of the source's levels are finer than that of the nodes.
     level: usize,
     nodes: ElasticNodes,
+    /// Nodes of the source that given pairs hold.
+    held: &'a Holds,
 }
 
 impl<'a> Registration<'a> {
@@ -83,8 +86,13 @@ impl<'a> Registration<'a> {
     pub(super) const FINE_STEPS: usize = FINE_STEPS;
 
     /// Will lay the first surface onto the second, from where `start` takes it, beginning with
-    /// assignments of standard deviation `width`.
-    pub(super) fn new([source, target]: [&'a Surface; 2], start: &RigidMotion, width: f64) -> Self {
+    /// assignments of standard deviation `width`; `held` is of the first surface.
+    pub(super) fn new(
+        [source, target]: [&'a Surface; 2],
+        start: &RigidMotion,
+        width: f64,
+        held: &'a Holds,
+    ) -> Self {
         let level = source.levels.len().min(target.levels.len()) - 1;
         let rest = &source.levels[level].places;
         let motion = NodeMotion {
@@ -97,7 +105,12 @@ impl<'a> Registration<'a> {
             width,
             step: 0,
             level,
-            nodes: elastic(&source.levels[level], motion),
+            nodes: held.bend(
+                level,
+                &source.levels[level],
+                elastic(&source.levels[level], motion),
+            ),
+            held,
         }
     }
 
@@ -112,7 +125,8 @@ impl<'a> Registration<'a> {
         let level = &self.source.levels[self.level];
         let motion = &self.nodes.motion;
         let facing = turned(motion, &level.normals);
-        let pulls = stage.pulls((self.source, motion, &facing), self.target, self.level);
+        let mut pulls = stage.pulls((self.source, motion, &facing), self.target, self.level);
+        self.held.act(self.level, level, motion, &mut pulls);
         self.nodes.relax(&pulls, stage.resistance(level), ROUNDS);
         self.step += 1;
     }
@@ -124,7 +138,8 @@ impl<'a> Registration<'a> {
         }
         let stage = Stage::new(self.width, STEPS - 1);
         let level = self.source.finest();
-        let pulls = fine_pulls((level, &self.nodes.motion), (self.target, back));
+        let mut pulls = fine_pulls((level, &self.nodes.motion), (self.target, back));
+        self.held.act(0, level, &self.nodes.motion, &mut pulls);
         self.nodes.relax(&pulls, stage.resistance(level), ROUNDS);
     }
 

@@ -7,9 +7,13 @@
 //! Image and Vision Computing 23, 2005), fewer and fewer of them. Mirrored candidates there are none. Scans mostly come in
 //! one frame and animals look alike from several sides, so that no motion is kept unless another
 //! comes clearly closer.
+//!
+//! Given pairs decide it where there are any. The motion that fits them best is a candidate too, as it is and improved.
+//! Each candidate is judged by how close the surfaces come and by how far it misses the pairs, and none is preferred.
 
 use rayon::prelude::*;
 
+use super::anchors::Anchors;
 use super::rotation::RigidMotion;
 use super::surface::Surface;
 use crate::geometry::linear::{
@@ -44,10 +48,13 @@ pub(super) struct Alignment {
 }
 
 /// The best of all candidates.
-pub(super) fn align(source: &Surface, target: &Surface) -> Alignment {
-    let sides = Sides::new(source, target);
+pub(super) fn align(source: &Surface, target: &Surface, anchors: &Anchors) -> Alignment {
+    let sides = Sides::new(source, target, anchors);
     let unmoved = sides.distance(&RigidMotion::IDENTITY);
     let tried = sides.improved(sides.candidates());
+    if !anchors.is_empty() {
+        return sides.best_with_anchors(tried, unmoved);
+    }
     let mut best = (RigidMotion::IDENTITY, unmoved, CLEARLY);
     for (motion, distance) in tried {
         if distance < best.2 * best.1 {
@@ -63,7 +70,8 @@ pub(super) fn align(source: &Surface, target: &Surface) -> Alignment {
 
 /// How well the surfaces lie as they are.
 pub(super) fn as_given(source: &Surface, target: &Surface) -> Alignment {
-    let unmoved = Sides::new(source, target).distance(&RigidMotion::IDENTITY);
+    let none = Anchors::default();
+    let unmoved = Sides::new(source, target, &none).distance(&RigidMotion::IDENTITY);
     Alignment {
         motion: RigidMotion::IDENTITY,
         distance: unmoved,
@@ -75,10 +83,11 @@ pub(super) fn as_given(source: &Surface, target: &Surface) -> Alignment {
 struct Sides<'a> {
     surfaces: [&'a Surface; 2],
     probes: [Vec<([f64; 3], [f64; 3])>; 2],
+    anchors: &'a Anchors,
 }
 
 impl<'a> Sides<'a> {
-    fn new(source: &'a Surface, target: &'a Surface) -> Self {
+    fn new(source: &'a Surface, target: &'a Surface, anchors: &'a Anchors) -> Self {
         let surfaces = [source, target];
         let probes = surfaces.map(|surface| {
             let nodes = surface
@@ -91,7 +100,11 @@ impl<'a> Sides<'a> {
                 .map(|node| (surface.points[node], surface.normals[node]))
                 .collect()
         });
-        Self { surfaces, probes }
+        Self {
+            surfaces,
+            probes,
+            anchors,
+        }
     }
 
     /// The closest pairs from one surface to the other, both at rest, with squared distances: those
@@ -120,7 +133,29 @@ impl<'a> Sides<'a> {
         (means[0] + means[1]) / 2.0
     }
 
-    /// The candidates that go on to the end, improved, and how close they come, in their order.
+    /// What a candidate is judged by.
+    fn score(&self, motion: &RigidMotion) -> f64 {
+        self.distance(motion) + self.anchors.miss(motion)
+    }
+
+    /// The candidate with the best score, of which the given pairs have a part.
+    fn best_with_anchors(&self, tried: Vec<(RigidMotion, f64)>, unmoved: f64) -> Alignment {
+        let fitted = self.anchors.rigid();
+        let rounds = ROUNDS.iter().map(|(rounds, _)| rounds).sum();
+        let improved = (0..rounds).fold(fitted, |motion, _: usize| self.closer(&motion));
+        let others = [RigidMotion::IDENTITY, fitted, improved];
+        let others = others.map(|motion| (motion, self.score(&motion)));
+        let all = others.into_iter().chain(tried);
+        let best = all.min_by(|a, b| a.1.total_cmp(&b.1));
+        let motion = best.expect("there are three and more").0;
+        Alignment {
+            motion,
+            distance: self.distance(&motion),
+            unmoved,
+        }
+    }
+
+    /// The candidates that go on to the end, improved, and their scores, in their order.
     fn improved(&self, candidates: Vec<RigidMotion>) -> Vec<(RigidMotion, f64)> {
         let mut tried: Vec<(RigidMotion, f64)> = candidates
             .into_iter()
@@ -135,7 +170,7 @@ impl<'a> Sides<'a> {
             let going_on: Vec<RigidMotion> = going_on.collect();
             let after = |&start: &RigidMotion| {
                 let motion = (0..rounds).fold(start, |motion, _| self.closer(&motion));
-                (motion, self.distance(&motion))
+                (motion, self.score(&motion))
             };
             tried = going_on.par_iter().map(after).collect();
         }

@@ -8,6 +8,7 @@ use crate::error::{Error, Result};
 use crate::event::Event;
 use crate::formats::Shape;
 use crate::matching::{MatchOptions, Matching, match_shapes};
+use crate::shape::Correspondences;
 
 /// Finds which vertices of two shapes correspond: two poses or states of one thing, as meshes or point
 /// clouds, complete or with parts missing. The same shapes and options give the same pairs, whatever the
@@ -19,10 +20,36 @@ pub fn find(
     source: &Shape,
     target: &Shape,
     options: &MatchOptions,
+    on_event: impl FnMut(&Event),
+) -> Result<Matching> {
+    find_around(source, target, &Correspondences::none(), options, on_event)
+}
+
+/// The same with some pairs given, in a file as `data.correspondences` reads it, such as one that was picked by
+/// hand. The search follows them, and the result holds them as they are.
+///
+/// # Errors
+/// Those of [`find`], and what is wrong with the file.
+pub fn find_from(
+    source: &Shape,
+    target: &Shape,
+    given: &Path,
+    options: &MatchOptions,
+    on_event: impl FnMut(&Event),
+) -> Result<Matching> {
+    let given = Correspondences::read(given, source, target)?;
+    find_around(source, target, &given, options, on_event)
+}
+
+fn find_around(
+    source: &Shape,
+    target: &Shape,
+    given: &Correspondences,
+    options: &MatchOptions,
     mut on_event: impl FnMut(&Event),
 ) -> Result<Matching> {
     let mut report = |stage, done, total| on_event(&Event::Matching { stage, done, total });
-    Ok(match_shapes(source, target, options, &mut report)?)
+    Ok(match_shapes(source, target, given, options, &mut report)?)
 }
 
 impl Matching {

@@ -83,9 +83,15 @@ fn matched(
         seed: recipe.training.seed,
         ..MatchOptions::default()
     };
-    let found = match_shapes(source, target, &options, &mut |stage, done, total| {
-        emit(&Event::Matching { stage, done, total });
-    })?;
+    let found = match_shapes(
+        source,
+        target,
+        &Correspondences::none(),
+        &options,
+        &mut |stage, done, total| {
+            emit(&Event::Matching { stage, done, total });
+        },
+    )?;
     Ok((found.correspondences(), Some(found)))
 }
 

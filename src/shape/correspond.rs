@@ -16,6 +16,11 @@ pub struct Correspondences {
 }
 
 impl Correspondences {
+    /// No pair at all.
+    pub(crate) fn none() -> Self {
+        Self::default()
+    }
+
     /// Every vertex of the source corresponds to the target's vertex of the same index.
     ///
     /// # Errors

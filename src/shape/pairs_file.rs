@@ -63,6 +63,19 @@ impl Correspondences {
         };
         found.resolve(path, [source, target])
     }
+
+    /// The pairs in the text of such a file; `path` opens the messages.
+    ///
+    /// # Errors
+    /// Those of [`Self::read`], but for the file itself.
+    pub(crate) fn parse(
+        text: &str,
+        path: &Path,
+        source: &Shape,
+        target: &Shape,
+    ) -> Result<Self, ShapeError> {
+        Rows::of_text(path, text.as_bytes())?.resolve(path, [source, target])
+    }
 }
 
 impl Rows {

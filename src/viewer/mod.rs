@@ -1,11 +1,12 @@
-//! `report.html`: a run as one page that works without a network, drawn by three.js.
+//! Pages that work without a network, drawn by three.js: `report.html`, a run, and the page of `isomorph pick`.
 //!
 //! | file | what it does |
 //! |---|---|
+//! | `pick.rs` | [`PickPage`], two shapes side by side to pick pairs of vertices on |
 //! | `page.rs` | [`Page`], what the page shows, and [`Page::html`], the page itself |
-//! | `block.rs` | positions and values as bytes: what the page's program reads |
+//! | `block.rs` | positions and values as bytes: what a page's program reads |
 //! | `thin.rs` | meshes and clouds with fewer points |
-//! | `web/` | the page's program and its look: JavaScript, HTML, CSS |
+//! | `web/` | the program of both pages and their look: JavaScript, HTML, CSS |
 //! | `assets/viewer.js` | the program bundled with three.js: `npm ci` and `node build.mjs` in `web/` |
 //!
 //! The bundle is committed, so that a build needs no Node. `node build.mjs --check` says whether it is what its
@@ -15,7 +16,9 @@
 
 mod block;
 mod page;
+mod pick;
 mod thin;
 
 pub(crate) use page::{End, Page, Quality, Track, Values};
+pub(crate) use pick::PickPage;
 pub(crate) use thin::{Thinned, thinned, thinned_cloud};

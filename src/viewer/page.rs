@@ -99,8 +99,8 @@ pub(crate) struct Quality {
 }
 
 const TEMPLATE: &str = include_str!("web/page.html");
-const STYLE: &str = include_str!("web/style.css");
-const PROGRAM: &str = include_str!("assets/viewer.js");
+pub(super) const STYLE: &str = include_str!("web/style.css");
+pub(super) const PROGRAM: &str = include_str!("assets/viewer.js");
 
 impl Page {
     /// The page, one file that loads nothing.
@@ -193,7 +193,7 @@ fn end(end: &End, block: &mut Block) -> Value {
 }
 
 /// Text that HTML shows as it is.
-fn escaped(text: &str) -> String {
+pub(super) fn escaped(text: &str) -> String {
     let escapes = [
         ("&", "&amp;"),
         ("<", "&lt;"),
@@ -206,7 +206,7 @@ fn escaped(text: &str) -> String {
 }
 
 /// A template with `{{NAME}}` replaced; what comes in is not looked at again.
-fn filled(template: &str, values: &[(&str, &str)]) -> String {
+pub(super) fn filled(template: &str, values: &[(&str, &str)]) -> String {
     let length: usize = values.iter().map(|(_, value)| value.len()).sum();
     let mut out = String::with_capacity(template.len() + length);
     let mut rest = template;

@@ -134,8 +134,14 @@ fn every_command_has_help_that_names_its_defaults() {
         ),
         (
             "match",
-            &["--aligned", "[default: pairs.csv]", "[default: 0.5]"],
+            &[
+                "--aligned",
+                "--pairs",
+                "[default: pairs.csv]",
+                "[default: 0.5]",
+            ],
         ),
+        ("pick", &["--pairs", "--no-browser", "--page", "--force"]),
         ("normals", &["--output", "point out of the shape"]),
         ("init", &["[default: none]", "[default: default]", "--all"]),
         ("info", &["recipe", "run"]),

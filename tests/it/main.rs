@@ -25,6 +25,7 @@ mod normals;
 mod old_runs;
 mod outputs;
 mod paper;
+mod picking;
 mod resume;
 mod samples;
 mod support;

@@ -1,4 +1,4 @@
-// Bundles the page's program into one file that is committed: node build.mjs
+// Bundles the program of both pages into one file that is committed: node build.mjs
 // With --check it builds anew, compares, and fails where the committed file is another one.
 import { build } from 'esbuild';
 import fs from 'node:fs';

@@ -3,6 +3,7 @@
 import { gradient, THEMES } from './colours.js';
 import { drawCurves, significant } from './curves.js';
 import { readRun } from './data.js';
+import { startPicking } from './pick.js';
 import { canRecord, savePicture, saveVideo } from './save.js';
 import { Stage, VIEWS } from './stage.js';
 
@@ -278,7 +279,8 @@ function results(run) {
 }
 
 try {
-  start();
+  // Two pages have this one program; each holds its own data.
+  if ($('shapes')) startPicking(); else start();
 } catch (error) {
   console.error(error);
   const text = `The picture cannot be drawn: ${error.message}. The page needs WebGL 2, which most browsers have; look whether it is switched off.`;

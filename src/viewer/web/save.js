@@ -1,6 +1,6 @@
 // What is saved from the page: the picture as it stands, and a video of the whole way.
 
-function keep(blob, name) {
+export function keep(blob, name) {
   const link = document.createElement('a');
   link.href = URL.createObjectURL(blob);
   link.download = name;
