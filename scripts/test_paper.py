@@ -170,7 +170,9 @@ class Experiments(unittest.TestCase):
         for label in ("truth", "divergence on", "divergence off", "human_male_to_heavy, 0-10"):
             self.assertEqual(texts.count(label), 1, label)
         variants = [word for word in self.calls()[0] if "divergence off" in word]
-        self.assertEqual(variants, ["divergence off=quick,loss.divergence=0,loss.strain=0"])
+        recorded = "training.optimiser=adam,training.guided-until=0"
+        keys = "loss.divergence=0,loss.strain=0"
+        self.assertEqual(variants, [f"divergence off=quick,{recorded},{keys}"])
 
     def test_every_other_experiment_runs_to_its_figure(self):
         for name in (

@@ -71,7 +71,16 @@ def variant(row: Row, experiment: Experiment, size: Size, data: tuple[str, ...])
     ours = row.method == OURS
     method = size.ours if ours else row.method
     network = size.network if ours and experiment.network else ()
-    return ",".join([f"{row.label}={method}", *network, *experiment.keys, *data, *row.keys])
+    keys = [*network, *experiment.keys, *data, *row.keys]
+    return ",".join([f"{row.label}={method}", *as_recorded(method, keys), *keys])
+
+
+def as_recorded(method: str, keys: list[str]) -> tuple[str, ...]:
+    """What makes `quick` what it was when the experiments were recorded: Adam, and no splines."""
+    if method != "quick":
+        return ()
+    adam, unguided = "training.optimiser=adam", "training.guided-until=0"
+    return (adam,) if "implicit.geometry=network" in keys else (adam, unguided)
 
 
 def command(

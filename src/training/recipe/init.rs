@@ -19,7 +19,7 @@ const FIRST: [(&str, &str); 10] = [
     (
         "preset",
         "Quality against time. Every key that is left out has the preset's value. On two cores \
-         \"instant\" takes about five seconds, \"quick\" takes about one minute, \"default\" about ten minutes, \"quality\" about an hour. \
+         \"instant\" takes about five seconds, \"quick\" takes about half a minute, \"default\" about two minutes, \"quality\" about an hour. \
          \"paper\" is the method as the paper prints it, and takes hours.",
     ),
     (
