@@ -112,7 +112,7 @@ fn the_page_is_given_and_pairs_are_written_whole_or_not_at_all() {
         // What is no file of pairs changes nothing.
         for (bad, why) in [
             ("0,1\n100,1\n", "pairs.csv:2: vertex 100 of "),
-            ("0,1\n1;2\n", "two whole numbers"),
+            ("0,1\n1,two\n", "two whole numbers"),
             ("# nothing\n", "at least 1 needed"),
         ] {
             let answer = posted(port, &pairs, bad);
