@@ -37,9 +37,9 @@ checkpoint.evry = 5
 checkpoint."ev\u001bry" = 5
     checkpoint.ev�ry: no such key; did you mean every? ([checkpoint] has every, keep)
 result.steps = 5
-    result.steps: no such key; it belongs in [training] ([result] has frames, resolution, smallest-component)
+    result.steps: no such key; it belongs in [training] ([result] has frames, resolution, preview-every, smallest-component)
 result.zzz = 5
-    result.zzz: no such key ([result] has frames, resolution, smallest-component)
+    result.zzz: no such key ([result] has frames, resolution, preview-every, smallest-component)
 steps = 5
     steps: no such key; it belongs in [training] (above all sections stands preset)
 preste = 'quick'
@@ -138,7 +138,7 @@ fn overrides_win_in_their_order_and_name_themselves_when_refused() {
         ),
         (
             "result.frame=5",
-            "no such key; did you mean frames? ([result] has frames, resolution, smallest-component)",
+            "no such key; did you mean frames? ([result] has frames, resolution, preview-every, smallest-component)",
         ),
         (
             "results.frames=5",

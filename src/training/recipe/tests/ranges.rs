@@ -96,6 +96,7 @@ checkpoint.every               1       0        10000000 10000001
 checkpoint.keep                1       0        10000000 10000001
 result.frames                  0       -1       1000     1001
 result.resolution              8       7        2048     2049
+result.preview-every           0       -1       10000000 10000001
 result.smallest-component      0       -1e-9    1        1.001
 "#;
 
