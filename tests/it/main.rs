@@ -26,6 +26,7 @@ mod old_runs;
 mod outputs;
 mod paper;
 mod picking;
+mod progress;
 mod resume;
 mod samples;
 mod support;
