@@ -144,7 +144,7 @@ impl Trained {
     }
 }
 
-/// Begins an array of an archive: the header of a `.npy` file, version 1.0.
+/// Begins an array of an archive.
 fn array<W: Write + io::Seek>(
     archive: &mut ZipWriter<W>,
     name: &str,
@@ -156,17 +156,24 @@ fn array<W: Write + io::Seek>(
         .compression_method(zip::CompressionMethod::Stored)
         .large_file(true);
     archive.start_file(format!("{name}.npy"), options)?;
+    archive.write_all(&npy_header(kind, shape))
+}
+
+/// The header of a `.npy` file, version 1.0; the numbers follow it, the last side running fastest.
+pub(super) fn npy_header(kind: &str, shape: &[usize]) -> Vec<u8> {
     let sides: String = shape.iter().map(|side| format!("{side}, ")).collect();
     let mut text = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({sides}), }}");
     // The numbers begin at a multiple of 64 bytes.
     let length = (10 + text.len() + 1).next_multiple_of(64) - 10;
     text.extend(std::iter::repeat_n(' ', length - text.len() - 1));
     text.push('\n');
-    archive.write_all(b"\x93NUMPY\x01\x00")?;
-    archive.write_all(&(length as u16).to_le_bytes())?;
-    archive.write_all(text.as_bytes())
+    let mut header = b"\x93NUMPY\x01\x00".to_vec();
+    header.extend((length as u16).to_le_bytes());
+    header.extend(text.as_bytes());
+    header
 }
 
-fn bytes(numbers: &[f64]) -> Vec<u8> {
+/// Numbers as they stand in such a file.
+pub(super) fn bytes(numbers: &[f64]) -> Vec<u8> {
     numbers.iter().flat_map(|x| x.to_le_bytes()).collect()
 }

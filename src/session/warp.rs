@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
+use super::sampled_field::{bytes, npy_header};
 use super::trained::Trained;
+use crate::atomic::write_atomically;
 use crate::error::Result;
 use crate::formats::{Shape, carried_extension, read_any, rewrite_vertices};
 use crate::geometry::linear::{difference, length};
@@ -26,7 +28,8 @@ impl Trained {
     /// `out`.
     ///
     /// A PLY or an OBJ under a name of the same ending keeps all that is not a position: faces, edges, cells,
-    /// colours, and other elements of a PLY. Else `out`, a PLY or OBJ, has vertices and triangles.
+    /// colours, and other elements of a PLY. Else `out` has vertices and triangles as a PLY or OBJ, or vertices
+    /// alone as text (`.xyz`) or as an array of numpy (`.npy`).
     /// `progress` is given the number of points moved so far.
     ///
     /// # Errors
@@ -52,6 +55,17 @@ impl Trained {
         let ending = out.extension().unwrap_or_default();
         if ending.eq_ignore_ascii_case(carried_extension(file)) {
             rewrite_vertices(file, &moved, out)?;
+        } else if ending.eq_ignore_ascii_case("xyz") {
+            write_atomically(out, |to| {
+                moved
+                    .iter()
+                    .try_for_each(|[x, y, z]| writeln!(to, "{x} {y} {z}"))
+            })?;
+        } else if ending.eq_ignore_ascii_case("npy") {
+            write_atomically(out, |to| {
+                to.write_all(&npy_header("<f8", &[moved.len(), 3]))?;
+                to.write_all(&bytes(moved.as_flattened()))
+            })?;
         } else {
             let mut mesh = shape.mesh;
             mesh.vertices = moved;

@@ -276,6 +276,26 @@ fn points_of_any_file_go_with_the_motion_and_the_rest_of_the_file_stays() {
         .succeeded();
     let back = rows(&fs::read_to_string(place.path("back.obj")).expect("a file"));
     assert!((back[0][0] - 1.0).abs() < 1e-4, "{back:?}");
+    // As text and as an array of numpy.
+    for out in ["points.xyz", "points.npy"] {
+        let warp = ["warp", "run", "--points", "line.obj", "-o", out];
+        place.isomorph(&warp).succeeded();
+    }
+    let text = fs::read_to_string(place.path("points.xyz")).expect("a file");
+    let row = |row: &[f64]| row.iter().map(f64::to_string).collect::<Vec<_>>().join(" ");
+    let wanted: Vec<String> = moved.iter().map(|point| row(point)).collect();
+    assert_eq!(text.lines().collect::<Vec<_>>(), wanted);
+    let array = fs::read(place.path("points.npy")).expect("a file");
+    let header = array.len() - 3 * 3 * 8;
+    assert_eq!(header % 64, 0);
+    assert!(String::from_utf8_lossy(&array[..header]).contains("'shape': (3, 3, )"));
+    let numbers: Vec<f64> = array[header..]
+        .as_chunks::<8>()
+        .0
+        .iter()
+        .map(|bytes| f64::from_le_bytes(*bytes))
+        .collect();
+    assert_eq!(numbers, moved.concat());
     let late = [
         "warp", "run", "--points", "line.obj", "--to", "1.5", "-o", "x.obj",
     ];
