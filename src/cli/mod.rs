@@ -140,7 +140,7 @@ struct ProgressArgs {
 
 impl ProgressArgs {
     /// What shows the events of the run in this folder.
-    fn terminal(self, run: &std::path::Path) -> Terminal {
+    fn terminal(self, run: &Path) -> Terminal {
         match self.json {
             true => Terminal::json(),
             false => self.quiet.terminal(run),

@@ -16,7 +16,7 @@ use super::{Failure, Result, is_same_file, print, stop_on_interrupt};
 /// --pairs`, or data.correspondences in a recipe.
 #[derive(Debug, Args)]
 pub(super) struct PickArgs {
-    /// Shape at time 0, a mesh or point cloud as PLY or OBJ
+    /// Shape at time 0, a mesh or point cloud: PLY, OBJ, STL, OFF, glTF, NPY or text
     source: PathBuf,
 
     /// Shape at time 1

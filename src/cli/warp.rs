@@ -10,7 +10,8 @@ use super::{BackendArgs, Result, print};
 /// Move landmarks, polylines, or any mesh along the motion of a run
 ///
 /// A PLY or OBJ file is written again with its vertices moved. All else in it stays: faces, edges, cells, colours.
-/// Files of other formats become PLY, OBJ, text or an array of numpy. The points need not be those that the run was trained on, but should lie near the shapes.
+/// Files of other formats become PLY, OBJ, text or an array of numpy. The points need not be those that the run was
+/// trained on, but should lie near the shapes.
 #[derive(Debug, Args)]
 pub(super) struct WarpArgs {
     /// Folder of the run

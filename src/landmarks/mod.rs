@@ -44,8 +44,14 @@ impl Picker {
         let shapes = [Shape::read(source)?, Shape::read(target)?];
         let given = match given {
             Some(path) => {
-                Correspondences::read(path, &shapes[0], &shapes[1])?;
-                Some(String::from_utf8_lossy(&std::fs::read(path)?).into_owned())
+                let known = Correspondences::read(path, &shapes[0], &shapes[1])?;
+                let text = String::from_utf8_lossy(&std::fs::read(path)?).into_owned();
+                // As it is, with its names, unless the page would read other pairs from it: arrays, maps, vertices
+                // counted from 1.
+                Some(match is_read_alike(&text, &known) {
+                    true => text,
+                    false => known.text(),
+                })
             }
             None => None,
         };
@@ -110,6 +116,19 @@ impl Picker {
         write_atomically(&self.output, |out| out.write_all(text.as_bytes()))?;
         Ok(found.pairs.len())
     }
+}
+
+/// Whether a text has these pairs as lines of numbers with commas between, counted from 0: what the page reads.
+fn is_read_alike(text: &str, known: &Correspondences) -> bool {
+    let lines = text.trim_start_matches('\u{feff}').lines().map(str::trim);
+    let filled = lines.filter(|line| !line.is_empty() && !line.starts_with('#'));
+    let without_names = filled.skip_while(|line| line.starts_with(char::is_alphabetic));
+    let pair = |line: &str| -> Option<[u32; 2]> {
+        let mut fields = line.split(',').map(|field| field.trim().parse().ok());
+        Some([fields.next()??, fields.next()??])
+    };
+    let found: Option<Vec<_>> = without_names.map(pair).collect();
+    found.is_some_and(|found| found == known.pairs)
 }
 
 #[cfg(test)]

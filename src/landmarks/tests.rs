@@ -307,3 +307,32 @@ fn a_page_in_a_file_begins_with_the_pairs_given_and_does_not_send() {
     assert!(html.contains(r#""output":"out.csv""#) && html.contains(r#""served":false"#));
     assert!(html.contains("connect-src 'none'"));
 }
+
+#[test]
+fn pairs_that_the_page_would_read_otherwise_come_to_it_as_it_reads_them() {
+    let folder = folder();
+    let given = |text: &str| {
+        std::fs::write(folder.path().join("given.txt"), text).expect("written");
+        let picker = open(folder.path(), Some("given.txt"), "pairs.csv").expect("opened");
+        picker.given.expect("pairs")
+    };
+    let plain = "source_index,target_index\n# name: nose\n0, 119\n99,3,0.5\n";
+    assert_eq!(given(plain), plain);
+    let others = [
+        "# counted from 1\n1,120\n100,4\n",
+        "0;119\n99;3\n",
+        "0 119\n99 3\n",
+    ];
+    for text in others {
+        assert_eq!(
+            given(text),
+            "source_index,target_index\n0,119\n99,3\n",
+            "{text}"
+        );
+    }
+    let sure = given("0;119;1\n99;3;0.25\n");
+    assert_eq!(
+        sure,
+        "source_index,target_index,confidence\n0,119,1.000\n99,3,0.250\n"
+    );
+}

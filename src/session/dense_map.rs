@@ -9,6 +9,7 @@ use crate::atomic::write_atomically;
 use crate::error::{Error, Result};
 use crate::geometry::NeighbourSearch;
 use crate::geometry::linear::{difference, length};
+use crate::shape::Correspondences;
 
 /// Misses beyond the spacing of the vertices of this size, in normalised units, halve a confidence.
 const HALVES: f64 = 0.02;
@@ -93,13 +94,17 @@ impl DenseMap {
     /// # Errors
     /// What the file system says; the message names the file.
     pub fn write_csv(&self, path: &Path) -> Result<()> {
-        write_atomically(path, |out| {
-            writeln!(out, "source_index,target_index,confidence")?;
-            for (source, pair) in self.pairs.iter().enumerate() {
-                writeln!(out, "{source},{},{:.3}", pair.target, pair.confidence)?;
-            }
-            Ok(())
-        })?;
+        let pairs = self.pairs.iter().enumerate();
+        let known = Correspondences {
+            pairs: pairs.map(|(k, pair)| [k as u32, pair.target]).collect(),
+            confidence: self
+                .pairs
+                .iter()
+                .map(|pair| pair.confidence as f32)
+                .collect(),
+            notes: Vec::new(),
+        };
+        write_atomically(path, |out| out.write_all(known.text().as_bytes()))?;
         Ok(())
     }
 

@@ -55,6 +55,32 @@ impl ExtractOptions {
             folder: None,
         }
     }
+
+    /// Refuses what no extraction can be.
+    fn check(&self) -> Result<()> {
+        self.times.iter().try_for_each(|time| check_time(*time))?;
+        if !(0.0..=1.0).contains(&self.smallest_component) {
+            return Err(Error::usage(format!(
+                "smallest component {}: must be 0 to 1 (0 keeps every piece)",
+                self.smallest_component
+            )));
+        }
+        let infinite = |offset: &&f64| !offset.is_finite();
+        if let Some(offset) = self.layers.iter().find(infinite) {
+            return Err(Error::usage(format!(
+                "layer {offset}: must be a finite length"
+            )));
+        }
+        if !self.layers.is_empty() && !matches!(self.format, OutputFormat::Frames(_)) {
+            let text = "layers: an animation has none; take the format ply or obj";
+            return Err(Error::usage(text.to_owned()));
+        }
+        if self.trust && self.format == OutputFormat::Frames(SurfaceFormat::Obj) {
+            let text = "trust: OBJ holds no numbers for vertices; take the format ply or glb";
+            return Err(Error::usage(text.to_owned()));
+        }
+        Ok(())
+    }
 }
 
 /// Evenly spaced times from 0 to 1.
@@ -99,30 +125,7 @@ impl Trained {
         log: &mut RunLog,
         on_event: &mut dyn FnMut(&Event),
     ) -> Result<Vec<Frame>> {
-        options
-            .times
-            .iter()
-            .try_for_each(|time| check_time(*time))?;
-        if !(0.0..=1.0).contains(&options.smallest_component) {
-            return Err(Error::usage(format!(
-                "smallest component {}: must be 0 to 1 (0 keeps every piece)",
-                options.smallest_component
-            )));
-        }
-        let infinite = |offset: &&f64| !offset.is_finite();
-        if let Some(offset) = options.layers.iter().find(infinite) {
-            return Err(Error::usage(format!(
-                "layer {offset}: must be a finite length"
-            )));
-        }
-        if !options.layers.is_empty() && !matches!(options.format, OutputFormat::Frames(_)) {
-            let text = "layers: an animation has none; take the format ply or obj";
-            return Err(Error::usage(text.to_owned()));
-        }
-        if options.trust && options.format == OutputFormat::Frames(SurfaceFormat::Obj) {
-            let text = "trust: OBJ holds no numbers for vertices; take the format ply or glb";
-            return Err(Error::usage(text.to_owned()));
-        }
+        options.check()?;
         let frame_options = FrameOptions {
             times: options.times.clone(),
             resolution: options.resolution,

@@ -68,15 +68,7 @@ impl Trained {
                 times.len()
             )));
         }
-        let places: Vec<[f32; 3]> = (0..count)
-            .map(|k| {
-                let [_, ny, nz] = counts;
-                let [i, j, l] = [k / (ny * nz), k / nz % ny, k % nz];
-                learned
-                    .normalisation
-                    .apply([axes[0][i], axes[1][j], axes[2][l]])
-            })
-            .collect();
+        let places = self.places(&axes);
         let all = count * times.len() * if motion.is_some() { 2 } else { 1 };
         let mut done = 0;
         let own = |value: f32| learned.normalisation.invert_length(f64::from(value)) as f32;
@@ -122,6 +114,18 @@ impl Trained {
             times: times.len(),
             has_velocity: motion.is_some(),
         })
+    }
+
+    /// The nodes, normalised, those along z following one another.
+    fn places(&self, [x, y, z]: &[Vec<f64>; 3]) -> Vec<[f32; 3]> {
+        let frame = &self.learned().normalisation;
+        let mut places = Vec::with_capacity(x.len() * y.len() * z.len());
+        for &x in x {
+            for &y in y {
+                places.extend(z.iter().map(|&z| frame.apply([x, y, z])));
+            }
+        }
+        places
     }
 
     /// The coordinates of the nodes along each axis of the box.

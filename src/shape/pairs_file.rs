@@ -78,6 +78,24 @@ impl Correspondences {
     }
 }
 
+impl Correspondences {
+    /// The text of a file of these pairs: a line of names, then a pair on each line, with its confidence where pairs
+    /// have one.
+    pub(crate) fn text(&self) -> String {
+        let sure = |k: usize| self.confidence.get(k).map(|sure| format!(",{sure:.3}"));
+        let mut text = String::from("source_index,target_index");
+        text += if self.confidence.is_empty() {
+            "\n"
+        } else {
+            ",confidence\n"
+        };
+        for (k, [source, target]) in self.pairs.iter().enumerate() {
+            text += &format!("{source},{target}{}\n", sure(k).unwrap_or_default());
+        }
+        text
+    }
+}
+
 impl Rows {
     fn of_text(path: &Path, bytes: &[u8]) -> Result<Self, ShapeError> {
         let mut found = Self::default();
