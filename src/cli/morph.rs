@@ -8,7 +8,7 @@ use isomorph::{OutputFormat, Precision, is_run};
 use serde_json::{Value, json};
 
 use super::new_run::NewRunArgs;
-use super::{Failure, Result, print};
+use super::{Failure, ProgressArgs, Result, print};
 
 /// Turn one shape into another: an animation and a page to look at, from two files
 ///
@@ -66,11 +66,12 @@ pub(super) fn run(args: MorphArgs) -> Result {
     let progress = args.new.progress;
     if progress.is_for_people() {
         plan.assumed.iter().for_each(|text| eprintln!("{text}"));
-        plan.doubts.iter().for_each(warn);
     }
     if progress.json {
         print(&lines(plan.assumed.iter().map(assumed)))?;
-        print(&lines(plan.doubts.iter().map(doubtful)))?;
+    }
+    if progress.json || progress.is_for_people() {
+        warn(&plan.doubts, progress)?;
     }
     let mut watch = MorphWatch::default();
     let animated = OutputFormat::Animation(Precision::Full);
@@ -87,10 +88,7 @@ pub(super) fn run(args: MorphArgs) -> Result {
                 finding,
                 cure: "going on with the preset quick, which takes longer".to_owned(),
             };
-            match progress.json {
-                true => print(&lines([doubtful(&note)].into_iter()))?,
-                false => warn(&note),
-            }
+            warn(&[note], progress)?;
             watch = MorphWatch::default();
             args.new.train(
                 plan_with("quick")?.recipe,
@@ -103,10 +101,8 @@ pub(super) fn run(args: MorphArgs) -> Result {
         other => other?,
     };
     let doubts = watch.doubts();
-    if progress.json {
-        print(&lines(doubts.iter().map(doubtful)))?;
-    } else {
-        doubts.iter().for_each(warn);
+    warn(&doubts, progress)?;
+    if !progress.json {
         if doubts.is_empty() && plan.doubts.is_empty() && progress.is_for_people() {
             eprintln!("nothing speaks against the result: one look at the page is still worth it");
         }
@@ -116,9 +112,15 @@ pub(super) fn run(args: MorphArgs) -> Result {
     Ok(())
 }
 
-/// A doubt, and what to do about it.
-fn warn(doubt: &Doubt) {
-    eprintln!("doubtful: {}; {}", doubt.finding, doubt.cure);
+/// Says doubts, and what to do about them.
+fn warn(doubts: &[Doubt], progress: ProgressArgs) -> Result {
+    if progress.json {
+        return print(&lines(doubts.iter().map(doubtful)));
+    }
+    for Doubt { finding, cure } in doubts {
+        eprintln!("doubtful: {finding}; {cure}");
+    }
+    Ok(())
 }
 
 /// An assumption as an event.
