@@ -10,7 +10,8 @@ experiment goes on where it stopped when the same command is given again. With -
 trained: table and figure are made again from data.json.
 
 Without --full, a run is 1000 steps of 2200 points of the preset `quick`: 1 to 2 minutes on two
-cores. With it, 10,000 steps of 4000 points of the preset `paper`, as printed: hours.
+cores. With it, 10,000 steps of 4000 points of the preset `paper`, as printed: hours. The experiments of
+`instant` have the presets as they are, with --full too.
 
 Needs numpy and matplotlib. Exit status: 0 done, 1 failed, 2 usage, 130 interrupted.
 """
@@ -98,13 +99,13 @@ def main(words: list[str]) -> int:
 
 def show_list() -> None:
     for each in experiments.EXPERIMENTS:
-        count = f"{experiments.runs_of(each, experiments.SMALL)} runs"
+        count = f"{experiments.runs_of(each, each.sizes[0])} runs"
         print(f"{each.name:<20} {count:<8} {each.about}")
 
 
 def run(experiment: experiments.Experiment, options: argparse.Namespace, words: list[str]) -> None:
     """One experiment from its inputs to its figure."""
-    size = experiments.FULL if options.full else experiments.SMALL
+    size = experiment.sizes[options.full]
     name = f"{experiment.name}-full" if options.full else experiment.name
     folder = options.out / name
     if options.table:

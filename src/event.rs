@@ -83,6 +83,13 @@ pub enum Event {
     },
     /// Something that a user should read, in a sentence.
     Note(String),
+    /// Something that speaks against the result.
+    Doubtful {
+        /// What was found.
+        finding: String,
+        /// What to try next.
+        cure: String,
+    },
     /// Work before the first step begins that has no steps of its own.
     Preparing(Preparation),
     /// Pairs of two shapes are being found, which takes a few seconds.

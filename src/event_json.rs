@@ -34,6 +34,9 @@ pub(super) fn value(event: &Event) -> Value {
             })
         }
         Event::Note(text) => json!({"event": "note", "text": text}),
+        Event::Doubtful { finding, cure } => {
+            json!({"event": "doubtful", "finding": finding, "cure": cure})
+        }
         Event::Preparing(what) => {
             let what = match what {
                 Preparation::Points => "points",

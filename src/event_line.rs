@@ -28,6 +28,7 @@ pub(super) fn line(event: &Event, left: Option<Duration>) -> Option<String> {
         }
         Event::Started { .. } => return started(event),
         Event::Note(text) => format!("note: {}", text.replace('\n', " ")),
+        Event::Doubtful { finding, cure } => format!("doubtful: {finding}; {cure}"),
         Event::Matched { .. } => return matched(event),
         Event::PhaseEntered { phase, step } => format!("{phase} from step {} on", step + 1),
         Event::Step(report) => step(report, left),

@@ -72,7 +72,7 @@ pub use session::stop::StopFlag;
 pub use session::trained::{Distances, Surface};
 pub use session::warp::Warped;
 pub use session::{Session, Trained};
-pub use shape::{Keyframe, Keyframes, PointCloud};
+pub use shape::{CleanOptions, Keyframe, Keyframes, PointCloud};
 pub use surface::frames::OutputFormat;
 
 /// What a run logs of its steps: `metrics.jsonl`, written and read.
@@ -90,7 +90,7 @@ pub mod correspondence {
     pub use crate::matching::{
         Coverage, Cycle, MatchOptions, MatchedPair, Matching, Quantiles, Rigid,
     };
-    pub use crate::session::pairs::{find, find_from};
+    pub use crate::session::pairs::{find, find_from, known_pairs};
 }
 
 /// Corresponding vertices of two shapes, picked by hand on a page in the browser.

@@ -22,8 +22,9 @@ class Size:
 
     name: str
     ours: str
-    steps: int
-    batch: int
+    steps: int | None
+    """None: those of each preset."""
+    batch: int | None
     every: int
     """Every so many frames are evaluated where an experiment does not need them all."""
     network: tuple[str, ...] = ()
@@ -41,6 +42,8 @@ NETWORK = (
 )
 SMALL = Size("small", "quick", 1_000, 2_200, every=3, network=NETWORK)
 FULL = Size("full", "paper", 10_000, 4_000, every=1)
+# Presets as they are.
+PRESETS = Size("presets", "instant", None, None, every=3)
 
 
 @dataclass(frozen=True)
@@ -98,6 +101,8 @@ class Experiment:
     all_frames: bool = False
     network: bool = False
     """Whether the terms under study are those of one network f(x, t)."""
+    sizes: tuple[Size, Size] = (SMALL, FULL)
+    """For two cores, and with --full."""
 
     def rows_at(self, size: Size) -> list[Row]:
         return [row for row in self.rows if row.size in (None, size.name)]
@@ -108,10 +113,15 @@ FOX_HEAD = Subject("fox_survey", ((0, 18),))
 BEAR = Subject("bear_walk", ((0, 16), (16, 30), (30, 47)))
 BEAR_STEP = Subject("bear_walk", ((30, 47),))
 ARMS = Subject("human_raise_arms", ((0, 26),))
+ARMS_SWING = Subject("human_raise_arms", ((26, 53),))
 # Every pair of the evaluation protocol.
 PROTOCOL = (FOX, BEAR, Subject("human_raise_arms", ((0, 26), (26, 53))))
 HEAVY = Subject("human_male_to_heavy", ((0, 10),))
 FEET = Subject("human_feet_together", ((0, 26),), made_from="human_raise_arms")
+# A bar that turns as a whole by so many degrees, its true motion known.
+TURNS = tuple(
+    Subject(f"bar_turn_{degrees}", ((0, 8),), made_from="bar") for degrees in (90, 120, 150, 170)
+)
 
 # Without the terms that are ours, so that the term under study is not covered by another one.
 NO_STRAIN = ("loss.strain=0",)
@@ -320,6 +330,87 @@ EXPERIMENTS = (
             Row("steps: midpoint 3", "quick", integrator("midpoint", 3)),
             Row("steps: RK4 1", "quick", integrator("rk4", 1)),
         ),
+    ),
+)
+
+
+INSTANT_ONLY = (PRESETS, PRESETS)
+
+EXPERIMENTS += (
+    Experiment(
+        "instant-parts",
+        "The preset `instant` with each part of it taken out or exchanged.",
+        (FOX_HEAD, BEAR_STEP, ARMS, ARMS_SWING),
+        (
+            Row("instant"),
+            Row("seed 1", keys=("training.seed=1",)),
+            Row("seed 2", keys=("training.seed=2",)),
+            Row("fitted ends (quick)", "quick"),
+            Row("grid: spacing .1", keys=("spline.spacing=0.1",)),
+            Row("grid: spacing .07", keys=("spline.spacing=0.07",)),
+            Row("grid: spacing .035", keys=("spline.spacing=0.035",)),
+            Row("grid: no coarse levels", keys=("spline.coarse-shares=[]",)),
+            Row("V: stationary", keys=("velocity.time-dependent=false",)),
+            Row("quadrature: 6000 samples", keys=("spline.band=6000",)),
+            Row("quadrature: 96000 samples", keys=("spline.band=96000",)),
+            Row("tolerance .3", keys=("spline.tolerance=0.3",)),
+            Row("tolerance .003", keys=("spline.tolerance=0.003", "spline.iterations=400")),
+            Row("steps: 9", keys=("training.steps=9",)),
+            Row("steps: 36", keys=("training.steps=36",)),
+            Row("path: 1 step", keys=("training.time-steps=1",)),
+            Row("path: 6 steps", keys=("training.time-steps=6",)),
+            Row("V: no on-surface", keys=("loss.on-surface=0",)),
+            Row("V: no divergence", keys=("loss.divergence=0",)),
+            Row("V: no screw", keys=("loss.screw=0",)),
+            Row("V: strain / 100", keys=("loss.strain=0.03",)),
+        ),
+        sizes=INSTANT_ONLY,
+    ),
+    Experiment(
+        "instant-inputs",
+        "The preset `instant` on hard inputs.",
+        (FOX_HEAD, ARMS),
+        (
+            Row("5 % known"),
+            Row("1 % known", keys=("data.correspondence-fraction=0.01",)),
+            Row("none known: found by match", keys=("data.correspondences=match",)),
+            Row("none known: none sought", keys=("data.correspondences=none",)),
+            Row("20 % of the pairs wrong: near", input=Input("local-swaps", 0.2)),
+            Row("10 % of the pairs permuted", input=Input("global-swaps", 0.1)),
+            Row("clouds with normals", input=Input("holes", 0)),
+            Row("clouds without", keys=("data.normals=estimate",), input=Input("holes", 0)),
+            Row("clouds with holes", input=Input("holes", 3)),
+            Row("2000 points of the target", input=Input("sparse", 2000)),
+        ),
+        sizes=INSTANT_ONLY,
+    ),
+    Experiment(
+        "instant-volume",
+        "The preset `instant` on a person who becomes heavy: the volume grows.",
+        (HEAVY,),
+        (
+            Row("instant"),
+            Row("without divergence", keys=("loss.divergence=0",)),
+            Row("without divergence and strain", keys=("loss.divergence=0", "loss.strain=0.03")),
+            Row("quick without both", "quick", ("loss.divergence=0", "loss.strain=0")),
+        ),
+        "volume",
+        all_frames=True,
+        sizes=INSTANT_ONLY,
+    ),
+    Experiment(
+        "large-turns",
+        "A bar of 1.6 by .3 by .3 that turns as a whole: the preset `instant` beside networks.",
+        TURNS,
+        (
+            Row("instant"),
+            Row("instant: 1 % known", keys=("data.correspondence-fraction=0.01",)),
+            Row("instant: none sought", keys=("data.correspondences=none",)),
+            Row("quick", "quick"),
+            Row("quick without splines", "quick", ("training.guided-until=0",)),
+        ),
+        all_frames=True,
+        sizes=INSTANT_ONLY,
     ),
 )
 

@@ -4,13 +4,14 @@ Clouds of 20,000 points are large and follow from the seed, so that only their s
 with the results. Everything is written in the sequence's own coordinates.
 """
 
+import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from . import PaperError, degrade, topology
+from . import PaperError, bar, degrade, topology
 from .experiments import PAIRS, POINTS, Input, Row, Subject
 from .sequences import (
     Sequence,
@@ -49,8 +50,10 @@ def sequence_of(subject: Subject, sequences: Path, cache: Path) -> Sequence:
     """The sequence of a subject: read, or made of another one into the cache."""
     if subject.made_from is None:
         return read_sequence(sequences / f"{subject.sequence}.anime")
-    human = read_sequence(sequences / f"{subject.made_from}.anime")
     path = cache / f"{subject.sequence}.anime"
+    if subject.made_from == "bar":
+        return write_sequence(path, *bar.turning(math.radians(float(subject.sequence.split("_")[-1]))))
+    human = read_sequence(sequences / f"{subject.made_from}.anime")
     return write_sequence(path, topology.feet_together(human), human.triangles)
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from . import PaperError, inputs
-from .experiments import OURS, Experiment, Row, Size, Subject
+from .experiments import OURS, PRESETS, Experiment, Row, Size, Subject
 
 Pair = tuple[int, int]
 
@@ -23,18 +23,16 @@ class Budget:
     """What every run of an experiment is given."""
 
     size: Size
-    steps: int
-    batch: int
+    steps: int | None
+    """None: those of each preset; so is the batch."""
+    batch: int | None
     seed: int
     backend: str | None
 
     @property
     def keys(self) -> tuple[str, ...]:
-        return (
-            f"training.steps={self.steps}",
-            f"training.batch={self.batch}",
-            f"training.seed={self.seed}",
-        )
+        given = {"steps": self.steps, "batch": self.batch, "seed": self.seed}
+        return tuple(f"training.{key}={value}" for key, value in given.items() if value is not None)
 
 
 @dataclass(frozen=True)
@@ -72,12 +70,15 @@ def variant(row: Row, experiment: Experiment, size: Size, data: tuple[str, ...])
     method = size.ours if ours else row.method
     network = size.network if ours and experiment.network else ()
     keys = [*network, *experiment.keys, *data, *row.keys]
-    return ",".join([f"{row.label}={method}", *as_recorded(method, keys), *keys])
+    return ",".join([f"{row.label}={method}", *as_recorded(method, keys, size), *keys])
 
 
-def as_recorded(method: str, keys: list[str]) -> tuple[str, ...]:
-    """What makes `quick` what it was when the experiments were recorded: Adam, and no splines."""
-    if method != "quick":
+def as_recorded(method: str, keys: list[str], size: Size) -> tuple[str, ...]:
+    """What makes `quick` what it was when the experiments were recorded: Adam, and no splines.
+
+    Experiments of the presets as they are take it as it is.
+    """
+    if method != "quick" or size == PRESETS:
         return ()
     adam, unguided = "training.optimiser=adam", "training.guided-until=0"
     return (adam,) if "implicit.geometry=network" in keys else (adam, unguided)

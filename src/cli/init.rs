@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use isomorph::correspondence::known_pairs;
 use isomorph::recipe::{Correspondences, Preset};
 use isomorph::{Recipe, Shape};
 
@@ -10,7 +11,7 @@ use super::{Failure, Result, print};
 
 /// Print a commented recipe for two shapes
 ///
-/// Both shapes are read, so an unreadable file is reported at once. The ten keys that people change stand
+/// The shapes and the pairs are read, so that what is wrong with a file is reported at once. The ten keys that people change stand
 /// first. The other keys of the chosen method follow. Save the recipe as a file and train with
 /// `isomorph train FILE`.
 #[derive(Debug, Args)]
@@ -36,9 +37,7 @@ pub(super) struct InitArgs {
 }
 
 pub(super) fn run(args: InitArgs) -> Result {
-    for path in [&args.source, &args.target] {
-        Shape::read(path)?;
-    }
+    let (source, target) = (Shape::read(&args.source)?, Shape::read(&args.target)?);
     let preset = Preset::from_word(&args.preset).ok_or_else(|| {
         let allowed = Preset::WORDS.join(", ");
         Failure::Usage(format!(
@@ -50,7 +49,11 @@ pub(super) fn run(args: InitArgs) -> Result {
         "none" => Correspondences::None,
         "same-vertices" => Correspondences::SameVertices,
         "match" => Correspondences::Match,
-        file => Correspondences::File(PathBuf::from(file)),
+        file => {
+            let file = PathBuf::from(file);
+            known_pairs(&file, &source, &target)?;
+            Correspondences::File(file)
+        }
     };
     let text = Recipe::commented(
         &args.source,

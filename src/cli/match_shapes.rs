@@ -5,8 +5,8 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use isomorph::Shape;
 use isomorph::correspondence::{MatchOptions, Matching, Rigid, find, find_from};
+use isomorph::{CleanOptions, Shape};
 use serde::Serialize;
 
 use super::{Failure, QuietArgs, Result, is_same_file, print};
@@ -45,6 +45,10 @@ pub(super) struct MatchArgs {
     /// Skip the search for a rigid motion, because the shapes are in the same coordinates already
     #[arg(long)]
     aligned: bool,
+
+    /// Use all points as they are; else what is no part of a surface is left out, as `isomorph clean` does
+    #[arg(long)]
+    raw: bool,
 
     /// Points sampled on each mesh, and the largest number used from a cloud
     #[arg(long, value_name = "N", default_value_t = MatchOptions::default().points)]
@@ -97,7 +101,22 @@ pub(super) fn run(args: MatchArgs) -> Result {
         count: args.count,
         seed: args.seed,
     };
-    let (source, target) = (Shape::read(&args.source)?, Shape::read(&args.target)?);
+    let [source, target] = [&args.source, &args.target].map(|path| -> Result<Shape> {
+        let shape = Shape::read(path)?;
+        let shape = if args.raw {
+            shape
+        } else {
+            shape.cleaned(&CleanOptions::default())
+        };
+        if !args.quiet.quiet {
+            shape
+                .notes
+                .iter()
+                .for_each(|note| eprintln!("note: {note}"));
+        }
+        Ok(shape)
+    });
+    let (source, target) = (source?, target?);
     let mut terminal = args.quiet.terminal(&args.output);
     let show = |event: &isomorph::Event| terminal.show(event);
     let matching = match &args.pairs {

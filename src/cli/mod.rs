@@ -11,6 +11,7 @@
 )]
 
 mod bench;
+mod clean;
 mod compare;
 mod evaluate;
 mod export;
@@ -72,6 +73,7 @@ enum Command {
     Compare(compare::CompareArgs),
     Match(match_shapes::MatchArgs),
     Pick(pick::PickArgs),
+    Clean(clean::CleanArgs),
     Normals(normals::NormalsArgs),
     Init(init::InitArgs),
     Info(info::InfoArgs),
@@ -162,6 +164,8 @@ enum Failure {
     Usage(String),
     /// Standard output cannot be written.
     Output(io::Error),
+    /// The result contradicts its input, which was said line by line.
+    Contradicted,
 }
 
 /// How a command ended.
@@ -189,6 +193,10 @@ impl Failure {
             }
             Self::Output(error) => (ErrorKind::Failure, format!("standard output: {error}")),
             Self::Usage(text) => (ErrorKind::Usage, text),
+            Self::Contradicted => (
+                ErrorKind::Failure,
+                "the result contradicts the shapes that were given (--strict); all files were written".to_owned(),
+            ),
             Self::Library(error) => (error.kind(), error.to_string()),
         };
         // The events have said so already, and what to do next.
@@ -215,6 +223,7 @@ pub(crate) fn run(cli: Cli) -> ExitCode {
         Command::Compare(args) => compare::run(args),
         Command::Match(args) => match_shapes::run(args),
         Command::Pick(args) => pick::run(args),
+        Command::Clean(args) => clean::run(args),
         Command::Normals(args) => normals::run(args),
         Command::Init(args) => init::run(args),
         Command::Info(args) => info::run(args),

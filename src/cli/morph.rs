@@ -100,10 +100,12 @@ pub(super) fn run(args: MorphArgs) -> Result {
         }
         other => other?,
     };
+    let contradicted = watch.is_contradicted();
     let doubts = watch.doubts();
     warn(&doubts, progress)?;
     if !progress.json {
-        if doubts.is_empty() && plan.doubts.is_empty() && progress.is_for_people() {
+        let is_fine = doubts.is_empty() && plan.doubts.is_empty() && !contradicted;
+        if is_fine && progress.is_for_people() {
             eprintln!("nothing speaks against the result: one look at the page is still worth it");
         }
         print(&written(&folder, page.as_deref()))?;

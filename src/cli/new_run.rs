@@ -6,7 +6,7 @@ use clap::Args;
 use isomorph::{Event, Recipe, Session};
 
 use super::view::show;
-use super::{BackendArgs, ProgressArgs, Result, SetArgs, stop_on_interrupt};
+use super::{BackendArgs, Failure, ProgressArgs, Result, SetArgs, stop_on_interrupt};
 
 /// How a new run is made and shown.
 #[derive(Debug, Args)]
@@ -18,6 +18,10 @@ pub(super) struct NewRunArgs {
     /// Replace an existing run
     #[arg(long)]
     pub force: bool,
+
+    /// Fail (exit status 1) if the surfaces at the ends contradict the shapes that were given
+    #[arg(long)]
+    strict: bool,
 
     #[command(flatten)]
     pub set: SetArgs,
@@ -45,14 +49,19 @@ impl NewRunArgs {
             session = session.replacing();
         }
         let mut terminal = self.progress.terminal(folder);
-        let mut page = None;
+        let (mut page, mut contradicted) = (None, false);
         session.train(|event| {
             on_event(event);
-            if let Event::Reported { path } = event {
-                page = Some(path.clone());
+            match event {
+                Event::Reported { path } => page = Some(path.clone()),
+                Event::Doubtful { .. } => contradicted = true,
+                _ => {}
             }
             terminal.show(event);
         })?;
+        if self.strict && contradicted {
+            return Err(Failure::Contradicted);
+        }
         Ok(page)
     }
 

@@ -17,10 +17,11 @@ use ply_rs::ply::{DefaultElement, Property};
 use super::cloud::Cloud;
 use super::error::ShapeError;
 use super::gltf;
-use super::obj::{Counts, parse_corner, statements, words};
+use super::obj::{self, Counts, parse_corner, statements, words};
 use super::ply::PlyFile;
+use super::polygons::Polygons;
 use super::read::Format;
-use super::shape::{Shape, push_fan};
+use super::shape::Shape;
 use crate::gltf::{Material, Part, Texture};
 
 /// How a shape looks. Vertices here are those of the file, except that one with several texture coordinates
@@ -45,16 +46,22 @@ impl Appearance {
     /// # Errors
     /// A file that has changed since the shape was read.
     pub(crate) fn read(shape: &Shape) -> Result<Self, ShapeError> {
-        match Format::of(&shape.path) {
-            Some(Format::Ply) => of_ply(shape),
-            Some(Format::Obj) => of_obj(shape),
-            Some(Format::Gltf) => gltf::appearance(shape),
-            Some(Format::Cloud) => Ok(Self {
+        let mut found = match Format::of(&shape.path) {
+            Some(Format::Ply) => of_ply(shape)?,
+            Some(Format::Obj) => of_obj(shape)?,
+            Some(Format::Gltf) => gltf::appearance(shape)?,
+            Some(Format::Cloud) => Self {
                 colours: Cloud::read(&shape.path)?.colours,
                 ..Self::plain(shape)
-            }),
-            _ => Ok(Self::plain(shape)),
+            },
+            _ => Self::plain(shape),
+        };
+        // Of points that were left out nothing is shown.
+        if let Some(kept) = &shape.kept {
+            found.colours = found.colours.map(|all| kept.select(&all));
+            found.texture = found.texture.map(|all| kept.select(&all));
         }
+        Ok(found)
     }
 
     /// Nothing but the geometry.
@@ -172,6 +179,8 @@ struct Obj {
     libraries: Vec<String>,
     group: Option<String>,
     material: Option<usize>,
+    /// Of each part.
+    polygons: Vec<Polygons>,
 }
 
 fn of_obj(shape: &Shape) -> Result<Appearance, ShapeError> {
@@ -179,6 +188,7 @@ fn of_obj(shape: &Shape) -> Result<Appearance, ShapeError> {
         path: shape.path.clone(),
         reason,
     })?;
+    let bytes = obj::text(&shape.path, &bytes)?;
     let mut obj = Obj::default();
     for (at, (keyword, rest)) in statements(&bytes).enumerate() {
         let whole = || String::from_utf8_lossy(rest).trim().to_owned();
@@ -196,7 +206,7 @@ fn of_obj(shape: &Shape) -> Result<Appearance, ShapeError> {
             _ => {}
         }
     }
-    if obj.colours.len() != shape.mesh.vertices.len() {
+    if obj.colours.len() != shape.file_count() {
         let problem = "it has changed since it was read";
         return Err(ShapeError::malformed(&shape.path, problem));
     }
@@ -241,10 +251,11 @@ impl Obj {
                     material: self.material,
                     triangles: Vec::new(),
                 });
+                self.polygons.push(Polygons::default());
                 self.parts.len() - 1
             }
         };
-        push_fan(&mut self.parts[at].triangles, &corners);
+        self.polygons[at].push(&corners);
         Ok(())
     }
 
@@ -257,7 +268,11 @@ impl Obj {
         is_there.then(|| u32::try_from(from_zero).ok()).flatten()
     }
 
-    fn finish(self, shape: &Shape) -> Appearance {
+    fn finish(mut self, shape: &Shape) -> Appearance {
+        let place = |k: u32| shape.mesh.vertices[self.vertices[k as usize].0 as usize];
+        for (part, polygons) in self.parts.iter_mut().zip(&self.polygons) {
+            part.triangles = polygons.triangles_at(place);
+        }
         if self.vertices.is_empty() {
             let colours: Option<Vec<[f32; 4]>> = self.colours.into_iter().collect();
             return Appearance {

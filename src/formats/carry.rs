@@ -14,7 +14,7 @@ use ply_rs::ply::{
 use ply_rs::writer::Writer;
 
 use super::error::ShapeError;
-use super::obj::{Corner, Counts, parse_corner, statements, words};
+use super::obj::{self, Corner, Counts, parse_corner, statements, words};
 use super::ply::PlyFile;
 use super::read::{Format, read_any};
 use super::shape::Shape;
@@ -107,7 +107,9 @@ pub(crate) fn rewrite_vertices(
         });
     }
     let infinite = |position: &[f64; 3]| position.iter().any(|coordinate| !coordinate.is_finite());
-    if let Some(vertex) = positions.iter().position(infinite) {
+    // A point of a cloud that had no place has none now.
+    let lost = |(position, before)| infinite(position) && (shape.is_mesh() || !infinite(before));
+    if let Some(vertex) = positions.iter().zip(&shape.mesh.vertices).position(lost) {
         let (path, position) = (original.to_owned(), positions[vertex]);
         return Err(CarryError::NotFinite {
             path,
@@ -133,6 +135,10 @@ pub(crate) fn carried_extension(original: &Path) -> String {
 
 /// The geometry alone, as PLY.
 fn write_moved(mut shape: Shape, out: &Path) -> Result<(), CarryError> {
+    if !shape.is_mesh() {
+        let has_place = |place: &[f64; 3]| place.iter().all(|part| part.is_finite());
+        shape.mesh.vertices.retain(has_place);
+    }
     let keeps_normals = shape.mesh.normals.take().is_some() && shape.is_mesh();
     shape.mesh.normals = keeps_normals.then(|| shape.mesh.vertex_normals());
     write_surface(&shape.mesh, out, SurfaceFormat::Ply)?;
@@ -231,6 +237,7 @@ fn rewrite_obj(shape: &Shape, out: &Path) -> Result<(), CarryError> {
         reason,
     };
     let bytes = std::fs::read(&shape.path).map_err(unreadable)?;
+    let bytes = obj::text(&shape.path, &bytes)?;
     let normals =
         normals_are_those_of_vertices(&bytes, mesh.vertices.len()).then(|| mesh.vertex_normals());
     let write = |out: &mut dyn Write| -> io::Result<()> {

@@ -16,7 +16,7 @@
 use std::path::Path;
 
 use super::error::ShapeError;
-use super::lines::{fields, lines, number, shown};
+use super::lines::{fields, lines, number, refuse_utf_16, shown};
 use super::shape::{Shape, file_bytes};
 use crate::geometry::Mesh;
 use crate::geometry::linear::{length, unit};
@@ -99,6 +99,7 @@ struct Table {
 impl Table {
     fn read(path: &Path) -> Result<Self, ShapeError> {
         let bytes = file_bytes(path)?;
+        refuse_utf_16(path, &bytes)?;
         let (mut names, mut count) = (None, None);
         let (mut width, mut values, mut first) = (0, Vec::new(), 0);
         for (at, line) in lines(&bytes) {

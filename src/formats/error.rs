@@ -136,6 +136,17 @@ pub enum ShapeError {
         /// Its number of vertices.
         target_vertices: usize,
     },
+    /// The pairs mirror the shape.
+    #[error(
+        "the pairs mirror {} into {}: no continuous motion does that; mirror one of the files (the sign of one axis), \
+         correct the pairs, or set data.mirrored = true", .source_path.display(), .target_path.display()
+    )]
+    Mirrored {
+        /// The source's file.
+        source_path: PathBuf,
+        /// The target's file.
+        target_path: PathBuf,
+    },
     /// A file of correspondences holds none.
     #[error("{}: no correspondences, at least 1 needed; for none set correspondences = \"none\"", .path.display())]
     NoCorrespondences {

@@ -6,6 +6,7 @@
 //! | `read.rs` | a file of any of the formats in, [`Shape`] out |
 //! | `ply.rs`, `obj.rs`, `stl.rs`, `off.rs`, `gltf/`, `npy.rs`, `cloud.rs`, `anime.rs` | one reader per format: bytes in, [`Shape`] (or [`Sequence`]) out |
 //! | `lines.rs` | lines of text with their numbers |
+//! | `polygons.rs` | polygons into triangles |
 //! | `weld.rs` | vertices at the same place become one |
 //! | `write.rs` | meshes as new PLY and OBJ files |
 //! | `carry.rs` | the input file again, its vertices moved; formats other than PLY and OBJ become PLY |
@@ -25,6 +26,7 @@ mod npy;
 mod obj;
 mod off;
 mod ply;
+mod polygons;
 mod read;
 mod shape;
 mod stl;
@@ -35,11 +37,12 @@ pub(crate) use anime::Sequence;
 pub(crate) use appearance::Appearance;
 pub(crate) use carry::{CarryError, carried_extension, rewrite_vertices};
 pub(crate) use error::{FEWEST_POINTS, ShapeError};
-pub(crate) use lines::{fields, lines, shown};
+pub(crate) use lines::{fields, lines, refuse_utf_16, shown};
 #[cfg(test)]
 pub(crate) use npy::tests as test_arrays;
 pub(crate) use npy::{Array, Arrays};
 pub(crate) use read::{read, read_any};
+pub(crate) use shape::Kept;
 pub use shape::Shape;
 pub(crate) use shape::file_bytes;
 pub use write::SurfaceFormat;

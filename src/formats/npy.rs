@@ -20,7 +20,8 @@ use zip::ZipArchive;
 pub(crate) use self::array::Array;
 use super::error::ShapeError;
 use super::lines::shown;
-use super::shape::{Shape, file_length, push_fan};
+use super::polygons::Polygons;
+use super::shape::{Shape, file_length};
 use crate::geometry::Mesh;
 use crate::geometry::linear::unit;
 
@@ -156,7 +157,7 @@ pub(super) fn read(path: &Path) -> Result<Shape, ShapeError> {
         None => own,
     };
     let triangles = match arrays.find(&FACES) {
-        Some(at) => triangles(&mut arrays, at, vertices.len())?,
+        Some(at) => triangles(&mut arrays, at, &vertices)?,
         None => Vec::new(),
     };
     let mesh = Mesh {
@@ -180,7 +181,11 @@ fn normals(arrays: &mut Arrays, at: usize, count: usize) -> Result<Vec<[f32; 3]>
     Ok(rows.map(|normal| unit(*normal)).collect())
 }
 
-fn triangles(arrays: &mut Arrays, at: usize, vertices: usize) -> Result<Vec<[u32; 3]>, ShapeError> {
+fn triangles(
+    arrays: &mut Arrays,
+    at: usize,
+    vertices: &[[f64; 3]],
+) -> Result<Vec<[u32; 3]>, ShapeError> {
     let array = arrays.read(at)?;
     let width = match array.shape[..] {
         [_, width] if width >= 3 => Some(width),
@@ -193,22 +198,23 @@ fn triangles(arrays: &mut Arrays, at: usize, vertices: usize) -> Result<Vec<[u32
             &format!("shape {shape}: must be (m, 3), or (m, k) for polygons"),
         ));
     };
-    let mut triangles = Vec::new();
+    let count = vertices.len();
+    let mut polygons = Polygons::default();
     let mut corners = Vec::with_capacity(width);
     for (face, row) in array.values.chunks_exact(width).enumerate() {
         corners.clear();
         for &corner in row {
-            if !(corner >= 0.0 && corner < vertices as f64 && corner.fract() == 0.0) {
+            if !(corner >= 0.0 && corner < count as f64 && corner.fract() == 0.0) {
                 let problem = format!(
-                    "face {face} refers to vertex {corner} (there are {vertices}, counted from 0)"
+                    "face {face} refers to vertex {corner} (there are {count}, counted from 0)"
                 );
                 return Err(arrays.wrong(at, &problem));
             }
             corners.push(corner as u32);
         }
-        push_fan(&mut triangles, &corners);
+        polygons.push(&corners);
     }
-    Ok(triangles)
+    Ok(polygons.triangles(vertices))
 }
 
 #[cfg(test)]

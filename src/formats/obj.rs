@@ -4,12 +4,17 @@
 //! The coordinates and normals are read here, line by line: tobj numbers vertices anew by their first
 //! use in each group and drops those that no face uses, while correspondences and the carried mesh need
 //! the file's own order; it also names no line in its errors, and refuses weights, comments and partial
-//! colours after coordinates. The polygons are tobj's to triangulate: each vertex goes in with its number
-//! as its position, so that the triangles come back in the file's own numbers.
+//! colours after coordinates. The faces are tobj's to read: each vertex goes in with its number as its
+//! position, so that the corners come back in the file's own numbers.
+//!
+//! A line that ends in a backslash goes on in the next one.
 
+use std::borrow::Cow;
 use std::path::Path;
 
 use super::error::ShapeError;
+use super::lines::{number_of, plain_text, shown};
+use super::polygons;
 use super::shape::{Shape, file_bytes};
 use crate::geometry::Mesh;
 use crate::geometry::linear::unit;
@@ -35,6 +40,39 @@ pub(super) struct Counts {
     pub normals: usize,
 }
 
+/// The text of a file as it is read: one line for each statement, as many lines as in the file.
+pub(super) fn text<'a>(path: &Path, bytes: &'a [u8]) -> Result<Cow<'a, [u8]>, ShapeError> {
+    let text = plain_text(path, bytes)?;
+    let goes_on = |text: &[u8]| {
+        let lines = text.split(|&byte| byte == b'\n');
+        lines
+            .into_iter()
+            .any(|line| line.trim_ascii_end().ends_with(b"\\"))
+    };
+    if !goes_on(&text) {
+        return Ok(text);
+    }
+    let mut joined = Vec::with_capacity(text.len());
+    let mut owed = 0;
+    for line in text.split_inclusive(|&byte| byte == b'\n') {
+        let content = line.trim_ascii_end();
+        // Not in a comment, which ends with its line.
+        match content.strip_suffix(b"\\") {
+            Some(begun) if !begun.contains(&b'#') => {
+                joined.extend_from_slice(begun);
+                joined.push(b' ');
+                owed += 1;
+            }
+            _ => {
+                joined.extend_from_slice(line);
+                // So that the lines after it keep their numbers.
+                joined.extend(std::iter::repeat_n(b'\n', std::mem::take(&mut owed)));
+            }
+        }
+    }
+    Ok(Cow::Owned(joined))
+}
+
 /// The lines of a file as keyword and the rest, without the comment.
 pub(super) fn statements(bytes: &[u8]) -> impl Iterator<Item = (&[u8], &[u8])> {
     bytes.split(|&byte| byte == b'\n').map(|line| {
@@ -52,7 +90,7 @@ pub(super) fn statements(bytes: &[u8]) -> impl Iterator<Item = (&[u8], &[u8])> {
 }
 
 /// The words of a statement; not UTF-8 shows as replacement characters and will not parse.
-pub(super) fn words(rest: &[u8]) -> impl Iterator<Item = std::borrow::Cow<'_, str>> {
+pub(super) fn words(rest: &[u8]) -> impl Iterator<Item = Cow<'_, str>> {
     let words = rest
         .split(u8::is_ascii_whitespace)
         .filter(|word| !word.is_empty());
@@ -62,6 +100,7 @@ pub(super) fn words(rest: &[u8]) -> impl Iterator<Item = std::borrow::Cow<'_, st
 /// Reads the geometry of an OBJ file.
 pub(super) fn read(path: &Path) -> Result<Shape, ShapeError> {
     let bytes = file_bytes(path)?;
+    let bytes = text(path, &bytes)?;
     let mut vertices = Vec::new();
     let mut vertex_normals = Vec::new();
     let mut polygons = Polygons::default();
@@ -76,6 +115,11 @@ pub(super) fn read(path: &Path) -> Result<Shape, ShapeError> {
                     normals: vertex_normals.len(),
                 };
                 polygons.push(rest, counts).map_err(here)?;
+            }
+            // No keyword is anything else; a file of another kind, or in another encoding, would lose lines in silence.
+            other if !other.is_ascii() => {
+                let shown = shown(&String::from_utf8_lossy(other));
+                return Err(here(format!("{shown:?} is no keyword of OBJ")));
             }
             _ => {}
         }
@@ -100,7 +144,7 @@ pub(super) fn read(path: &Path) -> Result<Shape, ShapeError> {
         });
     }
     let triangles = polygons
-        .triangulated(vertices.len())
+        .triangulated(&vertices)
         .map_err(|error| ShapeError::malformed(path, format!("its faces: {error}")))?;
     let normals = if triangles.is_empty() {
         // Without faces nothing else says which vertex a normal belongs to.
@@ -124,9 +168,7 @@ fn parse_vector(rest: &[u8]) -> Result<[f64; 3], String> {
         let word = words
             .next()
             .ok_or_else(|| format!("{axis} coordinates, 3 needed"))?;
-        *coordinate = word
-            .parse()
-            .map_err(|_unparsed| format!("{word:?} is not a number"))?;
+        *coordinate = number_of(&word)?;
     }
     Ok(vector)
 }
@@ -162,7 +204,7 @@ fn parse_index(part: &str, count: usize, word: &str) -> Result<u32, String> {
 /// What the `f` lines say.
 #[derive(Default)]
 struct Polygons {
-    /// The faces again, with all corners counted from 1: what tobj triangulates.
+    /// The faces again, with all corners counted from 1: what tobj reads.
     text: String,
     /// `[face, vertex]` with the greatest vertex.
     greatest: Option<(usize, u32)>,
@@ -198,24 +240,37 @@ impl Polygons {
     }
 
     /// The polygons as triangles of the file's own vertex numbers.
-    fn triangulated(&self, vertices: usize) -> Result<Vec<[u32; 3]>, tobj::LoadError> {
+    fn triangulated(&self, vertices: &[[f64; 3]]) -> Result<Vec<[u32; 3]>, tobj::LoadError> {
         if self.text.is_empty() {
             return Ok(Vec::new());
         }
-        let mut numbered: String = (0..vertices).map(|k| format!("v {k} 0 0\n")).collect();
+        let mut numbered: String = (0..vertices.len())
+            .map(|k| format!("v {k} 0 0\n"))
+            .collect();
         numbered.push_str(&self.text);
-        let options = tobj::LoadOptions {
-            triangulate: true,
-            ..Default::default()
-        };
         let no_materials = |_: &Path| Err(tobj::LoadError::OpenFileFailed);
+        let options = tobj::LoadOptions::default();
         let (models, _) = tobj::load_obj_buf(&mut numbered.as_bytes(), &options, no_materials)?;
-        let triangles = models.iter().flat_map(|model| {
-            let number = |k: &u32| model.mesh.positions[3 * *k as usize] as u32;
-            let corners = model.mesh.indices.as_chunks::<3>().0.iter();
-            corners.map(move |corners| corners.each_ref().map(number))
-        });
-        Ok(triangles.collect())
+        let mut polygons = polygons::Polygons::default();
+        for tobj::Mesh {
+            positions,
+            indices,
+            face_arities,
+            ..
+        } in models.iter().map(|model| &model.mesh)
+        {
+            let numbers = indices.iter().map(|&k| positions[3 * k as usize] as u32);
+            let numbers: Vec<u32> = numbers.collect();
+            let mut rest = &numbers[..];
+            // None are given where all faces are triangles.
+            let mut arities = face_arities.iter().map(|&arity| arity as usize);
+            while !rest.is_empty() {
+                let (face, after) = rest.split_at(arities.next().unwrap_or(3));
+                polygons.push(face);
+                rest = after;
+            }
+        }
+        Ok(polygons.triangles(vertices))
     }
 
     /// The face and vertex, if any, beyond this count: known only once all `v` lines are read.
@@ -359,5 +414,30 @@ v 0 1 1\nv .5 1 1.5e0\nv 1 1 1\nf -5//1 -4//1 -1 -2 -3\n";
                 .contains("vertex 1 is at [NaN")
         );
         assert!(message("hello\n").contains("not an OBJ file"));
+    }
+
+    #[test]
+    fn text_is_read_however_it_is_encoded_and_broken_into_lines() {
+        let plain = read_text(HOUSE).expect("read").mesh;
+        let joined = HOUSE.replace("v .5 1 1.5e0", "v \\\n .5 1\\\r\n1.5e0");
+        let texts = [
+            format!("\u{feff}{HOUSE}"),
+            HOUSE.replace("\r\n", "\n").replace('\n', "\r"),
+            joined.clone(),
+        ];
+        for text in texts {
+            assert_eq!(read_text(&text).expect("read").mesh, plain, "{text:?}");
+        }
+        // Lines after a joined one keep their numbers.
+        assert!(message(&joined.replace("v 1 1 1", "v 1 x 1")).contains("OBJ:18: \"x\""));
+        let text = message(&HOUSE.replace("v 0 1 1\n", "\u{ff56} 0 1 1\n"));
+        assert!(text.contains("is no keyword of OBJ"), "{text}");
+    }
+
+    #[test]
+    fn a_polygon_with_a_notch_keeps_its_area() {
+        let text = "v 0 0 0\nv 3 0 0\nv 3 3 0\nv 2 3 0\nv 2 1 0\nv 1 1 0\nv 1 3 0\nv 0 3 0\nf 1 2 3 4 5 6 7 8\n";
+        let mesh = read_text(text).expect("read").mesh;
+        assert_eq!((mesh.triangles.len(), mesh.area()), (6, 7.0));
     }
 }

@@ -8,14 +8,16 @@
 use std::path::Path;
 
 use super::error::ShapeError;
-use super::lines::{lines, shown, vector};
-use super::shape::{Shape, file_bytes, push_fan};
+use super::lines::{lines, refuse_utf_16, shown, vector};
+use super::polygons::Polygons;
+use super::shape::{Shape, file_bytes};
 use crate::geometry::Mesh;
 use crate::geometry::linear::unit;
 
 /// Reads the geometry of an OFF file.
 pub(super) fn read(path: &Path) -> Result<Shape, ShapeError> {
     let bytes = file_bytes(path)?;
+    refuse_utf_16(path, &bytes)?;
     let mut lines = Lines {
         path,
         count: bytes.split(|&byte| byte == b'\n').count(),
@@ -32,11 +34,11 @@ pub(super) fn read(path: &Path) -> Result<Shape, ShapeError> {
             normals.push(unit(vector(path, at, &words[3..])?));
         }
     }
-    let mut triangles = Vec::new();
+    let mut polygons = Polygons::default();
     for index in 0..header.faces {
         let (at, line) = lines.next("face", index, header.faces)?;
         let corners = corners(path, at, &line, index, header.vertices)?;
-        push_fan(&mut triangles, &corners);
+        polygons.push(&corners);
     }
     if let Some((at, line)) = lines.content() {
         let Header {
@@ -49,8 +51,8 @@ pub(super) fn read(path: &Path) -> Result<Shape, ShapeError> {
         return Err(ShapeError::line(path, at, problem));
     }
     let mesh = Mesh {
+        triangles: polygons.triangles(&vertices),
         vertices,
-        triangles,
         normals: header.with_normals.then_some(normals),
     };
     Ok(Shape::at(path, mesh))

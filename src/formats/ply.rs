@@ -1,12 +1,20 @@
 //! PLY, ascii and binary of either byte order, meshes and clouds.
 //!
-//! Read element by element through the ply-rs crate into a row that keeps only `x, y, z`,
-//! `nx, ny, nz` and `vertex_indices` (or `vertex_index`); every other element and property is
-//! stepped over. Before the payload is touched, the counts of the header are held against the
+//! Read element by element into a row that keeps only `x, y, z`, `nx, ny, nz` and `vertex_indices` (or
+//! `vertex_index`); every other element and property is stepped over. The header and binary elements are
+//! read by ply-rs. Before the payload is touched, the counts of the header are held against the
 //! length of the file: a header cannot make us allocate more than its file could fill.
+//!
+//! | file | what it does |
+//! |---|---|
+//! | `head.rs` | the text of the header, however its lines end |
+//! | `ascii.rs` | rows of numbers, however they are broken into lines |
+
+mod ascii;
+mod head;
 
 use std::fs::File;
-use std::io::{BufRead, BufReader, Seek};
+use std::io::{BufReader, Read};
 use std::path::Path;
 
 use ply_rs::parser::{ParseError, Parser, Reader};
@@ -14,22 +22,32 @@ use ply_rs::ply::{
     ElementDef, Encoding, Header, PropertyAccess, PropertyAccessResult, PropertyType, ScalarType,
 };
 
+use self::ascii::AsciiRows;
+use self::head::Head;
 use super::error::ShapeError;
-use super::shape::{Shape, file_length, push_fan};
+use super::polygons::Polygons;
+use super::shape::{Shape, file_length};
 use crate::geometry::Mesh;
 use crate::geometry::linear::unit;
 
 /// The names that hold a face's corners.
 const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
 
+/// The element of Stanford's models that holds triangle strips.
+const STRIPS: &str = "tristrips";
+
 /// An opened file whose header is read and found possible.
 pub(super) struct PlyFile<'a> {
     path: &'a Path,
     /// The header as the file has it.
     pub header: Header,
-    payload: BufReader<File>,
-    /// The line that the payload starts at, for messages about ascii files.
-    line: usize,
+    payload: Payload,
+}
+
+/// What follows the header.
+enum Payload {
+    Binary(BufReader<File>),
+    Ascii(AsciiRows),
 }
 
 impl<'a> PlyFile<'a> {
@@ -45,35 +63,30 @@ impl<'a> PlyFile<'a> {
             reason,
         };
         let file = File::open(path).map_err(unreadable)?;
-        let mut reader = Reader::new(BufReader::with_capacity(1 << 16, file));
-        if !reader
-            .get_mut()
-            .fill_buf()
-            .map_err(unreadable)?
-            .starts_with(b"ply")
-        {
-            return Err(ShapeError::malformed(
-                path,
-                "does not start with \"ply\": not a PLY file",
-            ));
-        }
-        let header = Parser::<Row>::new().read_header(&mut reader);
+        let mut reader = BufReader::with_capacity(1 << 16, file);
+        let head = Head::read(path, &mut reader)?;
+        let mut text = Reader::new(head.text.as_bytes());
+        let header = Parser::<Row>::new().read_header(&mut text);
         let header = header.map_err(|error| {
             let problem = format!("header: {}", library_message(&error));
             match error.line() {
-                Some(line) => ShapeError::line(path, line, problem),
+                Some(line) => ShapeError::line(path, head.line_in_file(line), problem),
                 None => ShapeError::malformed(path, problem),
             }
         })?;
-        let line = reader.line();
-        let mut payload = reader.into_inner();
-        let start = payload.stream_position().map_err(unreadable)?;
-        check_counts(path, &header, length.saturating_sub(start))?;
+        check_counts(path, &header, length.saturating_sub(head.length))?;
+        let payload = match header.encoding {
+            Encoding::Ascii => {
+                let mut bytes = Vec::new();
+                reader.read_to_end(&mut bytes).map_err(unreadable)?;
+                Payload::Ascii(AsciiRows::new(&bytes, head.lines + 1, &header))
+            }
+            _ => Payload::Binary(reader),
+        };
         Ok(Self {
             path,
             header,
             payload,
-            line,
         })
     }
 
@@ -87,58 +100,39 @@ impl<'a> PlyFile<'a> {
         mut keep: impl FnMut(&ElementDef, usize, E) -> Result<(), ShapeError>,
     ) -> Result<(), ShapeError> {
         let parser = Parser::<E>::new();
-        let mut text = String::new();
+        let little = self.header.encoding == Encoding::BinaryLittleEndian;
         for element in self.header.elements.values() {
             for index in 0..element.count {
-                let row = match self.header.encoding {
-                    Encoding::BinaryLittleEndian => {
-                        parser.read_little_endian_element(&mut self.payload, element)
-                    }
-                    Encoding::BinaryBigEndian => {
-                        parser.read_big_endian_element(&mut self.payload, element)
-                    }
-                    Encoding::Ascii => {
-                        text.clear();
-                        let read = self.payload.read_line(&mut text);
-                        self.line += 1;
-                        match read {
-                            Ok(0) => {
-                                Err(std::io::Error::from(std::io::ErrorKind::UnexpectedEof).into())
-                            }
-                            Ok(_) => parser.read_ascii_element(&text, element),
-                            Err(reason) => Err(reason.into()),
-                        }
+                let row = match &mut self.payload {
+                    Payload::Ascii(rows) => rows.next(self.path, element, index)?,
+                    Payload::Binary(bytes) => {
+                        let row = if little {
+                            parser.read_little_endian_element(bytes, element)
+                        } else {
+                            parser.read_big_endian_element(bytes, element)
+                        };
+                        row.map_err(|error| refusal(self.path, element, index, &error))?
                     }
                 };
-                let row = row.map_err(|error| self.refusal(element, index, &error, &text))?;
                 keep(element, index, row)?;
             }
         }
-        Ok(())
-    }
-
-    /// What is wrong with one element, in a line.
-    fn refusal(
-        &self,
-        element: &ElementDef,
-        index: usize,
-        error: &ParseError,
-        text: &str,
-    ) -> ShapeError {
-        let (name, count) = (&element.name, element.count);
-        let ended = error.kind() == std::io::ErrorKind::UnexpectedEof;
-        if self.header.encoding == Encoding::Ascii && !ended {
-            let shown: String = text.trim().chars().take(60).collect();
-            let problem = format!("{name} {index}: {shown:?}: {}", expected(element));
-            return ShapeError::line(self.path, self.line - 1, problem);
+        match &self.payload {
+            Payload::Ascii(rows) => rows.check_end(self.path),
+            Payload::Binary(_) => Ok(()),
         }
-        let problem = if ended {
-            format!("the file ends within {name} {index} of {count}: it is truncated")
-        } else {
-            format!("{name} {index} of {count}: {}", library_message(error))
-        };
-        ShapeError::malformed(self.path, problem)
     }
+}
+
+/// What is wrong with one element of a binary file.
+fn refusal(path: &Path, element: &ElementDef, index: usize, error: &ParseError) -> ShapeError {
+    let (name, count) = (&element.name, element.count);
+    let problem = if error.kind() == std::io::ErrorKind::UnexpectedEof {
+        format!("the file ends within {name} {index} of {count}: it is truncated")
+    } else {
+        format!("{name} {index} of {count}: {}", library_message(error))
+    };
+    ShapeError::malformed(path, problem)
 }
 
 /// Reads the geometry of a PLY file.
@@ -147,7 +141,7 @@ pub(super) fn read(path: &Path) -> Result<Shape, ShapeError> {
     let with_normals = check_elements(path, &file.header)?;
     let mut vertices = Vec::new();
     let mut normals = Vec::new();
-    let mut triangles = Vec::new();
+    let mut polygons = Polygons::default();
     // Faces may come before the vertices, so their range is checked against the header's count.
     let count = file.header.elements["vertex"].count;
     let mut corners = Vec::new();
@@ -159,21 +153,30 @@ pub(super) fn read(path: &Path) -> Result<Shape, ShapeError> {
                     normals.push(unit(row.normal));
                 }
             }
-            "face" => {
-                corners.clear();
-                for &corner in &row.corners {
-                    let inside = u32::try_from(corner)
-                        .ok()
-                        .filter(|&at| (at as usize) < count);
-                    corners.push(inside.ok_or_else(|| ShapeError::IndexOutOfRange {
+            name @ ("face" | STRIPS) => {
+                let inside = |corner: i64| {
+                    let found = u32::try_from(corner).ok();
+                    let found = found.filter(|&at| (at as usize) < count);
+                    found.ok_or_else(|| ShapeError::IndexOutOfRange {
                         path: path.to_owned(),
                         face: index,
                         index: corner,
                         vertices: count,
                         base: "",
-                    })?);
+                    })
+                };
+                // A strip ends at -1, and another begins.
+                let ends = |corner: &i64| name == STRIPS && *corner == -1;
+                for run in row.corners.split(ends) {
+                    corners.clear();
+                    for &corner in run {
+                        corners.push(inside(corner)?);
+                    }
+                    match name {
+                        STRIPS => polygons.push_strip(&corners),
+                        _ => polygons.push(&corners),
+                    }
                 }
-                push_fan(&mut triangles, &corners);
             }
             _ => {}
         }
@@ -181,8 +184,8 @@ pub(super) fn read(path: &Path) -> Result<Shape, ShapeError> {
     })?;
     let normals = with_normals.then_some(normals);
     let mesh = Mesh {
+        triangles: polygons.triangles(&vertices),
         vertices,
-        triangles,
         normals,
     };
     Ok(Shape::at(path, mesh))
@@ -211,21 +214,17 @@ fn check_elements(path: &Path, header: &Header) -> Result<bool, ShapeError> {
             format!("the vertices have no property {missing}"),
         ));
     }
-    if header
-        .elements
-        .get("tristrips")
-        .is_some_and(|strips| strips.count > 0)
-    {
-        let problem = "triangle strips (element tristrips) are not read; save it with plain faces";
-        return Err(ShapeError::malformed(path, problem));
-    }
-    if let Some(face) = header.elements.get("face").filter(|face| face.count > 0) {
+    for name in ["face", STRIPS] {
+        let Some(face) = header.elements.get(name).filter(|face| face.count > 0) else {
+            continue;
+        };
         let list = |name: &&str| {
             let property = face.properties.get(*name);
             property.is_some_and(|found| matches!(found.data_type, PropertyType::List(..)))
         };
         if !CORNERS.iter().any(list) {
-            let problem = "the faces have no property list vertex_indices (or vertex_index)";
+            let problem =
+                format!("the element {name} has no property list vertex_indices (or vertex_index)");
             return Err(ShapeError::malformed(path, problem));
         }
     }
@@ -270,12 +269,6 @@ fn least_bytes(kind: &PropertyType) -> u128 {
         ScalarType::Int | ScalarType::UInt | ScalarType::Float => 4,
         ScalarType::Double => 8,
     }
-}
-
-/// What a line of an ascii element must look like.
-fn expected(element: &ElementDef) -> String {
-    let names: Vec<&str> = element.properties.keys().map(String::as_str).collect();
-    format!("must be finite numbers for {}", names.join(" "))
 }
 
 /// The library's message in one line: what is wrong, and the text that is. It goes on over several,

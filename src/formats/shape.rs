@@ -15,6 +15,30 @@ pub struct Shape {
     pub mesh: Mesh<f64>,
     /// What was decided about the contents of the file, one sentence each.
     pub notes: Vec<String>,
+    /// Which vertices of the file these are, where some were left out.
+    pub(crate) kept: Option<Kept>,
+}
+
+/// Which vertices of a file a shape has.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Kept {
+    /// The number in the file of each vertex of the shape, ascending.
+    numbers: Vec<u32>,
+    /// How many the file has.
+    of: usize,
+}
+
+impl Kept {
+    /// The number in the file of a shape's vertex.
+    pub(crate) fn number_of(kept: Option<&Self>, vertex: u32) -> u32 {
+        kept.map_or(vertex, |kept| kept.numbers[vertex as usize])
+    }
+
+    /// What there is one of for each vertex of the file, for those of the shape.
+    pub(super) fn select<T: Copy>(&self, of_file: &[T]) -> Vec<T> {
+        let kept = self.numbers.iter();
+        kept.map(|number| of_file[*number as usize]).collect()
+    }
 }
 
 impl Shape {
@@ -29,6 +53,7 @@ impl Shape {
             path: PathBuf::from("shape"),
             mesh,
             notes: Vec::new(),
+            kept: None,
         }
     }
 
@@ -43,6 +68,66 @@ impl Shape {
     /// Whether the shape has faces; without any it is a point cloud.
     pub fn is_mesh(&self) -> bool {
         !self.mesh.triangles.is_empty()
+    }
+
+    /// How many vertices the file has; some may be left out of the shape.
+    pub(crate) fn file_count(&self) -> usize {
+        let kept = self.kept.as_ref();
+        kept.map_or(self.mesh.vertices.len(), |kept| kept.of)
+    }
+
+    /// The number in the file of one of the shape's vertices.
+    pub(crate) fn number_in_file(&self, vertex: u32) -> u32 {
+        Kept::number_of(self.kept.as_ref(), vertex)
+    }
+
+    /// The shape's vertex that has this number in the file, unless it was left out.
+    pub(crate) fn vertex_of_number(&self, number: u32) -> Option<u32> {
+        let Some(kept) = &self.kept else {
+            return ((number as usize) < self.mesh.vertices.len()).then_some(number);
+        };
+        kept.numbers.binary_search(&number).ok().map(|at| at as u32)
+    }
+
+    /// A cloud without the points that are not to be kept; vertices keep their numbers in the file.
+    ///
+    /// # Panics
+    /// If the shape is a mesh, or there is not one answer for each point.
+    pub(crate) fn keeping(mut self, keep: &[bool]) -> Self {
+        assert!(!self.is_mesh(), "triangles name vertices");
+        assert_eq!(keep.len(), self.mesh.vertices.len(), "one for each point");
+        if keep.iter().all(|keep| *keep) {
+            return self;
+        }
+        let of = self.file_count();
+        let stay = || {
+            keep.iter()
+                .enumerate()
+                .filter(|(_, keep)| **keep)
+                .map(|(k, _)| k)
+        };
+        let numbers = stay().map(|k| self.number_in_file(k as u32)).collect();
+        self.kept = Some(Kept { numbers, of });
+        self.mesh.vertices = stay().map(|k| self.mesh.vertices[k]).collect();
+        let normals = self.mesh.normals.as_ref();
+        self.mesh.normals = normals.map(|normals| stay().map(|k| normals[k]).collect());
+        self
+    }
+
+    /// Without points that have no place; a note says how many they were.
+    fn with_places(self) -> Self {
+        let is_place = |vertex: &[f64; 3]| vertex.iter().all(|part| part.is_finite());
+        let keep: Vec<bool> = self.mesh.vertices.iter().map(is_place).collect();
+        let lost = keep.iter().filter(|keep| !**keep).count();
+        if lost == 0 {
+            return self;
+        }
+        let (name, count) = (self.path.display(), keep.len());
+        let note =
+            format!("{name}: {lost} of {count} points have no place (NaN or infinite): left out");
+        let mut shape = self.keeping(&keep);
+        shape.notes.push(note);
+        shape
     }
 
     /// Surface area in the user's units squared: of the triangles of a mesh, or estimated from the
@@ -67,7 +152,18 @@ impl Shape {
     }
 
     /// What every shape must satisfy, whatever its format.
+    ///
+    /// Points of a cloud that have no place are left out.
     pub(super) fn checked(self) -> Result<Self, ShapeError> {
+        let shape = if self.is_mesh() {
+            self
+        } else {
+            self.with_places()
+        };
+        shape.made_sure()
+    }
+
+    fn made_sure(self) -> Result<Self, ShapeError> {
         let infinite = |vertex: &[f64; 3]| vertex.iter().any(|coordinate| !coordinate.is_finite());
         let vertices = &self.mesh.vertices;
         if let Some(vertex) = vertices.iter().position(infinite) {
@@ -127,27 +223,9 @@ pub(crate) fn file_bytes(path: &Path) -> Result<Vec<u8>, ShapeError> {
     })
 }
 
-/// Adds a polygon as a fan of triangles around its first corner: exact for convex polygons.
-///
-/// Polygons of fewer than three corners have no area and are passed over.
-pub(super) fn push_fan(triangles: &mut Vec<[u32; 3]>, corners: &[u32]) {
-    for edge in corners.get(1..).unwrap_or_default().windows(2) {
-        triangles.push([corners[0], edge[0], edge[1]]);
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_polygon_becomes_a_fan_and_less_than_a_triangle_becomes_nothing() {
-        let mut triangles = Vec::new();
-        push_fan(&mut triangles, &[]);
-        push_fan(&mut triangles, &[1, 2]);
-        push_fan(&mut triangles, &[4, 5, 6, 7]);
-        assert_eq!(triangles, [[4, 5, 6], [4, 6, 7]]);
-    }
 
     #[test]
     fn clouds_that_say_nothing_are_refused() {
@@ -162,9 +240,7 @@ mod tests {
         };
         assert!(cloud(vec![[1.0; 3]; 12]).contains("12 points, at least 64 needed"));
         assert!(cloud(vec![[1.0; 3]; 100]).contains("all 100 vertices are at"));
-        let mut vertices = vec![[1.0; 3]; 100];
-        vertices[7][2] = f64::NAN;
-        assert!(cloud(vertices).contains("vertex 7 "), "names the vertex");
+        assert!(cloud(vec![[f64::NAN; 3]; 100]).contains("0 points, at least 64 needed"));
     }
 
     #[test]
@@ -178,5 +254,36 @@ mod tests {
         };
         let text = shape.checked().expect_err("refused").to_string();
         assert!(text.starts_with("line.obj: surface area 0"), "{text}");
+    }
+
+    #[test]
+    fn points_without_a_place_are_left_out_and_the_others_keep_their_numbers() {
+        let mut vertices: Vec<[f64; 3]> = (0..100).map(|k| [f64::from(k), 0.0, 0.0]).collect();
+        vertices[7][2] = f64::NAN;
+        vertices[20][0] = f64::INFINITY;
+        let normals = (0..100).map(|k| [k as f32, 0.0, 0.0]).collect();
+        let mesh = Mesh {
+            vertices,
+            triangles: Vec::new(),
+            normals: Some(normals),
+        };
+        let shape = Shape::at(Path::new("cloud.ply"), mesh)
+            .checked()
+            .expect("a cloud");
+        let note = "cloud.ply: 2 of 100 points have no place (NaN or infinite): left out";
+        assert_eq!(shape.notes, [note]);
+        assert_eq!((shape.mesh.vertices.len(), shape.file_count()), (98, 100));
+        assert_eq!((shape.number_in_file(7), shape.number_in_file(97)), (8, 99));
+        assert_eq!(shape.vertex_of_number(7), None);
+        assert_eq!(shape.vertex_of_number(99), Some(97));
+        assert_eq!(shape.vertex_of_number(100), None);
+        assert_eq!(
+            shape.mesh.normals.as_ref().expect("normals")[7],
+            [8.0, 0.0, 0.0]
+        );
+        // Left out twice: numbers are still those of the file.
+        let every: Vec<bool> = (0..98).map(|k| k % 2 == 1).collect();
+        let half = shape.keeping(&every);
+        assert_eq!((half.number_in_file(3), half.file_count()), (8, 100));
     }
 }

@@ -3,6 +3,7 @@
 //! Extraction keeps every piece; a filter is the user's choice.
 
 use super::connected::Connected;
+use super::edges::weld;
 use super::linear::Scalar;
 use super::mesh::Mesh;
 
@@ -20,7 +21,18 @@ impl<T: Scalar> Mesh<T> {
     #[must_use]
     pub fn components(&self) -> Vec<Component> {
         let each_alone = (0..self.vertices.len() as u32).collect();
-        let mut sets = Connected::new(each_alone, &self.triangles);
+        self.components_of(each_alone)
+    }
+
+    /// The same with vertices at one place taken as one: files split them along the seams of textures.
+    #[must_use]
+    pub(crate) fn components_by_place(&self) -> Vec<Component> {
+        self.components_of(weld(&self.vertices))
+    }
+
+    /// The pieces where vertices stand for each other as in [`Connected::new`].
+    fn components_of(&self, stand_for: Vec<u32>) -> Vec<Component> {
+        let mut sets = Connected::new(stand_for, &self.triangles);
         let mut piece_of_root = vec![None; self.vertices.len()];
         let mut pieces: Vec<Component> = Vec::new();
         for (i, &triangle) in self.triangles.iter().enumerate() {
@@ -52,6 +64,15 @@ impl<T: Scalar> Mesh<T> {
             return (self, all, all);
         }
         (self.only(&pieces), pieces.len(), all)
+    }
+
+    /// The mesh without vertices that no triangle uses; a point cloud stays as it is.
+    #[must_use]
+    pub fn only_used(&self) -> Self {
+        match self.triangles.is_empty() {
+            true => self.clone(),
+            false => self.only(&self.components()),
+        }
     }
 
     /// The mesh of some of its pieces, without vertices that no triangle uses; the order of
@@ -128,6 +149,15 @@ mod tests {
         let mut mesh = scattered(&[1.0, 3.0, 2.0]);
         mesh.triangles.push([9, 4, 1]);
         assert_eq!(mesh.components().len(), 1);
+    }
+
+    #[test]
+    fn pieces_that_meet_in_places_but_not_in_numbers_are_one_by_place() {
+        let mut mesh = scattered(&[1.0, 1.0]);
+        // The second triangle begins where the first one ends.
+        mesh.vertices[4] = mesh.vertices[2];
+        assert_eq!(mesh.components().len(), 2);
+        assert_eq!(mesh.components_by_place().len(), 1);
     }
 
     #[test]

@@ -7,7 +7,9 @@
 //! | `edges.rs` | how the triangles of a mesh share their edges |
 //! | `connected.rs` | which vertices of a mesh are connected |
 //! | `components.rs` | the connected pieces of a mesh, without the small ones if desired |
+//! | `orient.rs` | triangles of a mesh turned outwards, each piece by itself |
 //! | `neighbours.rs` | k nearest neighbours |
+//! | `parts.rs` | groups of points with empty space between them |
 //! | `density.rs` | the spacing of points, and the area that they stand for |
 //! | `triangles.rs` | closest points of a mesh, and its winding number |
 //! | `winding.rs` | winding numbers of points with normals |
@@ -23,6 +25,8 @@ mod edges;
 pub(crate) mod linear;
 mod mesh;
 mod neighbours;
+mod orient;
+mod parts;
 #[cfg(test)]
 pub(crate) mod testing;
 mod triangles;
@@ -36,4 +40,6 @@ pub use linear::Scalar;
 pub use mesh::Mesh;
 pub(crate) use mesh::vertex_normals;
 pub(crate) use neighbours::{Neighbour, NeighbourSearch};
+pub(crate) use orient::turned_outwards;
+pub(crate) use parts::parts_apart;
 pub(crate) use triangles::{Closest, TriangleSearch};

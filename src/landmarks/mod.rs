@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 
 use crate::atomic::{check_writable, write_atomically};
 use crate::error::{Error, Result};
-use crate::formats::Shape;
+use crate::formats::{Kept, Shape};
 use crate::shape::Correspondences;
 use crate::viewer::PickPage;
 
@@ -29,7 +29,10 @@ const MOST_BYTES: usize = 256 << 20;
 /// Two shapes whose pairs are picked, and the file that the pairs go to.
 #[derive(Debug)]
 pub struct Picker {
+    /// As the page shows them: their vertices are all that there are.
     shapes: [Shape; 2],
+    /// Which vertices of their files these are.
+    kept: [Option<Kept>; 2],
     output: PathBuf,
     given: Option<String>,
 }
@@ -41,7 +44,7 @@ impl Picker {
     /// A file that cannot be read; pairs of vertices that do not exist; a folder in which `output` cannot be
     /// written; shapes too large for a page.
     pub fn open(source: &Path, target: &Path, given: Option<&Path>, output: &Path) -> Result<Self> {
-        let shapes = [Shape::read(source)?, Shape::read(target)?];
+        let mut shapes = [Shape::read(source)?, Shape::read(target)?];
         let given = match given {
             Some(path) => {
                 let known = Correspondences::read(path, &shapes[0], &shapes[1])?;
@@ -68,8 +71,10 @@ impl Picker {
             )));
         }
         check_writable(output)?;
+        let kept = shapes.each_mut().map(|shape| shape.kept.take());
         Ok(Self {
             shapes,
+            kept,
             output: output.to_owned(),
             given,
         })
@@ -112,8 +117,17 @@ impl Picker {
     /// Writes the text of a pairs file, whole or not at all, if it is one; how many pairs it has.
     fn save(&self, text: &str) -> Result<usize> {
         let [source, target] = &self.shapes;
-        let found = Correspondences::parse(text, &self.output, source, target)?;
-        write_atomically(&self.output, |out| out.write_all(text.as_bytes()))?;
+        let mut found = Correspondences::parse(text, &self.output, source, target)?;
+        if self.kept == [None, None] {
+            write_atomically(&self.output, |out| out.write_all(text.as_bytes()))?;
+            return Ok(found.pairs.len());
+        }
+        for pair in &mut found.pairs {
+            for (vertex, kept) in pair.iter_mut().zip(&self.kept) {
+                *vertex = Kept::number_of(kept.as_ref(), *vertex);
+            }
+        }
+        write_atomically(&self.output, |out| out.write_all(found.text().as_bytes()))?;
         Ok(found.pairs.len())
     }
 }

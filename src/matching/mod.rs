@@ -152,6 +152,7 @@ pub(crate) fn match_shapes(
         rigid: Rigid::new(&alignment, &frame),
         scale: frame.scale,
         seconds: clock.elapsed().as_secs_f64(),
+        kept: shapes.map(|shape| shape.kept.clone()),
         pairs,
     };
     report(MatchStage::Pairs, 1, 1);

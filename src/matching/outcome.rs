@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::pairs::MatchedPair;
 use super::rigid::Alignment;
+use crate::formats::Kept;
 use crate::geometry::linear::times;
 use crate::shape::{Correspondences, Normalisation};
 
@@ -30,6 +31,9 @@ pub struct Matching {
     pub scale: f64,
     /// Wall-clock seconds.
     pub seconds: f64,
+    /// Which vertices of its file each shape has.
+    #[serde(skip)]
+    pub(super) kept: [Option<Kept>; 2],
 }
 
 /// The share of each surface within `radius` of a matched vertex.
@@ -119,7 +123,9 @@ impl Matching {
             writeln!(out, "source_index,target_index,confidence")?;
             for pair in &self.pairs {
                 let confidence = written(pair.confidence);
-                writeln!(out, "{},{},{confidence}", pair.source, pair.target)?;
+                let [from, to] = [(0, pair.source), (1, pair.target)]
+                    .map(|(side, vertex)| Kept::number_of(self.kept[side].as_ref(), vertex));
+                writeln!(out, "{from},{to},{confidence}")?;
             }
             Ok(())
         })

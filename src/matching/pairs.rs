@@ -28,7 +28,7 @@ pub(super) const TOLERANCE: f64 = 0.02;
 /// One pair of vertices.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct MatchedPair {
-    /// Vertex of the source, counted from 0 in the order of its file.
+    /// Vertex of the source, counted from 0 in the order of the shape, which is that of its file.
     pub source: u32,
     /// Vertex of the target.
     pub target: u32,

@@ -57,7 +57,6 @@ fn cloud(points: &[(Point, Point)], motion: impl Fn(Point) -> Point) -> Shape {
     };
     Shape {
         path: PathBuf::from("body.ply"),
-        notes: Vec::new(),
         mesh: Mesh {
             vertices: points.iter().map(|point| motion(point.0)).collect(),
             triangles: Vec::new(),
@@ -68,6 +67,7 @@ fn cloud(points: &[(Point, Point)], motion: impl Fn(Point) -> Point) -> Shape {
                     .collect(),
             ),
         },
+        ..Shape::of(Mesh::default())
     }
 }
 

@@ -26,7 +26,9 @@ pub struct DenseMap {
 /// Where a vertex goes; lengths in the shapes' unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MappedVertex {
-    /// The vertex of the last shape that is nearest to where the motion carries it.
+    /// The vertex of the first shape, by its number in the file.
+    pub source: u32,
+    /// The vertex of the last shape, by its number in the file, that is nearest to where the motion carries it.
     pub target: u32,
     /// How far that is away.
     pub distance: f64,
@@ -49,6 +51,10 @@ impl Trained {
             let name = shapes[shapes.len() - 1].path.display();
             return Err(Error::usage(format!("{name}: needs two vertices or more")));
         }
+        let numbers = [0, shapes.len() - 1].map(|k| {
+            let shape = &shapes[k];
+            move |vertex: u32| shape.number_in_file(vertex)
+        });
         let search = NeighbourSearch::new(target);
         let arrived = self.carry(source, 0.0, 1.0)?;
         let found = search.nearest_one_of_each(&arrived);
@@ -68,7 +74,8 @@ impl Trained {
                 .map_or(0.0, |other| other.squared_distance.sqrt());
             let miss = (distance.max(round_trip) - spacing).max(0.0) / halves;
             MappedVertex {
-                target: near.index,
+                source: numbers[0](k as u32),
+                target: numbers[1](near.index),
                 distance,
                 round_trip,
                 confidence: 1.0 / (1.0 + miss * miss),
@@ -76,9 +83,9 @@ impl Trained {
         });
         let pairs: Vec<MappedVertex> = pairs.collect();
         let mut reached = vec![false; target.len()];
-        pairs
+        found
             .iter()
-            .for_each(|pair| reached[pair.target as usize] = true);
+            .for_each(|near| reached[near.index as usize] = true);
         let count = reached.iter().filter(|is| **is).count();
         Ok(DenseMap {
             pairs,
@@ -94,9 +101,9 @@ impl DenseMap {
     /// # Errors
     /// What the file system says; the message names the file.
     pub fn write_csv(&self, path: &Path) -> Result<()> {
-        let pairs = self.pairs.iter().enumerate();
+        let pairs = self.pairs.iter();
         let known = Correspondences {
-            pairs: pairs.map(|(k, pair)| [k as u32, pair.target]).collect(),
+            pairs: pairs.map(|pair| [pair.source, pair.target]).collect(),
             confidence: self
                 .pairs
                 .iter()

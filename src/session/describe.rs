@@ -11,6 +11,7 @@ use crate::error::{Error, Result};
 use crate::formats::{self, Sequence, Shape};
 use crate::geometry::EdgeSharing;
 use crate::recipe::Recipe;
+use crate::shape::{CleanOptions, NormalSource, wound_outwards};
 
 /// Says what is at a path: a shape, a sequence (`.anime`), a recipe (`.toml`) or a run.
 ///
@@ -47,24 +48,40 @@ fn shape_info(shape: &Shape) -> Result<String> {
     writeln!(text, "normals      {normals}")?;
     let (low, high) = box_of(&shape.mesh.vertices);
     writeln!(text, "box          {low:?} to {high:?}")?;
-    let estimated = if shape.is_mesh() {
-        ""
-    } else {
-        " (estimated from the density)"
+    let cleaned = shape.clone().cleaned(&CleanOptions::default());
+    let left_out = cleaned.mesh.vertices.len() != shape.mesh.vertices.len();
+    let estimated = match (shape.is_mesh(), left_out) {
+        (true, _) => "",
+        (false, false) => " (estimated from the density)",
+        (false, true) => " (estimated from the density of what is not left out)",
     };
-    writeln!(text, "area         {:.6}{estimated}", shape.area()?)?;
+    let area = digits(cleaned.area()?);
+    writeln!(text, "area         {area}{estimated}")?;
+    let mut notes = cleaned.notes.clone();
     if shape.is_mesh() {
-        let closed = EdgeSharing::of(&shape.mesh).is_closed();
-        writeln!(text, "closed       {}", if closed { "yes" } else { "no" })?;
-        if closed {
-            let volume = shape.mesh.volume();
-            writeln!(text, "volume       {volume:.6}")?;
+        let sharing = EdgeSharing::of(&shape.mesh);
+        let closed = if sharing.is_closed() { "yes" } else { "no" };
+        writeln!(text, "closed       {closed}")?;
+        if sharing.is_closed() {
+            let volume = digits(shape.mesh.volume());
+            writeln!(text, "volume       {volume}")?;
         }
+        wound_outwards(shape, NormalSource::Auto, &mut notes);
     }
-    for note in &shape.notes {
+    for note in &notes {
         writeln!(text, "note         {note}")?;
     }
     Ok(text)
+}
+
+/// A number with six significant digits, whatever its size.
+fn digits(number: f64) -> String {
+    let size = number.abs();
+    if number == 0.0 || (1e-3..1e9).contains(&size) {
+        let places = (5.0 - size.max(1e-300).log10().floor()).clamp(0.0, 9.0) as usize;
+        return format!("{number:.places$}");
+    }
+    format!("{number:.5e}")
 }
 
 fn sequence_info(sequence: &Sequence) -> String {

@@ -5,6 +5,7 @@
 //! |---|---|
 //! | `train.rs` | [`Session`]: a run from its recipe, or from its newest checkpoint |
 //! | `trained.rs` | [`Trained`]: a run that is opened, and what can be asked of it |
+//! | `against_input.rs` | the surfaces at the ends held against the shapes that were given |
 //! | `extract.rs` | the surfaces of a run as files, with a picture of them |
 //! | `report.rs`, `report_data.rs`, `report_log.rs`, `report_truth.rs` | the page of a run, `report.html` |
 //! | `warp.rs`, `dense_map.rs` | the motion put to use: points of any file, and a map from vertices to vertices |
@@ -22,6 +23,7 @@
 //! | `log.rs`, `metrics.rs` | what a run leaves in writing: `run.log`, `metrics.jsonl` |
 //! | `stop.rs` | a flag that ends the work early |
 
+mod against_input;
 pub(crate) mod bench;
 pub(crate) mod bench_run;
 pub(crate) mod checkpoint;

@@ -9,6 +9,7 @@ use crate::event::Event;
 use crate::formats::Shape;
 use crate::geometry::EdgeSharing;
 use crate::recipe::Recipe;
+use crate::shape::CleanOptions;
 
 /// What is asked for beyond the two files.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -57,7 +58,9 @@ impl Doubt {
 /// # Errors
 /// A file that cannot be read, a key that is refused.
 pub fn plan_morph(source: &Path, target: &Path, options: &MorphOptions) -> Result<MorphPlan> {
-    let shapes = [Shape::read(source)?, Shape::read(target)?];
+    // As the recipe reads them, unless it is changed to use all points.
+    let read = |path| Ok::<_, crate::Error>(Shape::read(path)?.cleaned(&CleanOptions::default()));
+    let shapes = [read(source)?, read(target)?];
     let same = same_faces(&shapes);
     let pairs = options.pairs.as_deref();
     let chosen = pairs.unwrap_or(if same { "same-vertices" } else { "match" });
@@ -143,6 +146,7 @@ pub struct MorphWatch {
     doubts: Vec<Doubt>,
     frames: Vec<Watched>,
     cut_off: bool,
+    contradicted: bool,
 }
 
 impl MorphWatch {
@@ -183,8 +187,14 @@ impl MorphWatch {
                     apart: *consistency,
                 });
             }
+            Event::Doubtful { .. } => self.contradicted = true,
             _ => {}
         }
+    }
+
+    /// Whether the run itself has said something that speaks against its result.
+    pub fn is_contradicted(&self) -> bool {
+        self.contradicted
     }
 
     /// What speaks against the result; nothing if all looks well.

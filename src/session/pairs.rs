@@ -41,6 +41,14 @@ pub fn find_from(
     find_around(source, target, &given, options, on_event)
 }
 
+/// How many pairs a file holds for two shapes, as `data.correspondences` reads it.
+///
+/// # Errors
+/// What is wrong with the file.
+pub fn known_pairs(path: &Path, source: &Shape, target: &Shape) -> Result<usize> {
+    Ok(Correspondences::read(path, source, target)?.pairs.len())
+}
+
 fn find_around(
     source: &Shape,
     target: &Shape,

@@ -11,7 +11,7 @@ use crate::matching::{MatchOptions, Matching, match_shapes};
 use crate::recipe::{self, Recipe};
 use crate::session::folder::RunFolder;
 use crate::shape::{
-    self, CorrespondenceSource, Correspondences, DataOptions, Keyframes, NormalSource,
+    self, CleanOptions, CorrespondenceSource, Correspondences, DataOptions, Keyframes, NormalSource,
 };
 
 /// Shapes ready for training.
@@ -21,17 +21,24 @@ pub(super) struct Prepared {
     found: Option<Matching>,
 }
 
-/// Reads the shapes of a recipe.
+/// Reads the shapes of a recipe, cleaned as it says.
 ///
 /// # Errors
 /// What [`formats::read`] refuses.
 pub(super) fn read(recipe: &Recipe) -> Result<Vec<Shape>> {
-    let shapes = recipe
-        .data
-        .keyframes
-        .iter()
-        .map(|key| formats::read(&key.file));
-    Ok(shapes.collect::<std::result::Result<_, _>>()?)
+    let section = &recipe.data;
+    let cleaning = (section.clean == recipe::Cleaning::Auto).then_some(CleanOptions {
+        strays: section.clean_strays,
+        part: section.clean_part,
+    });
+    let cleaned = |key: &recipe::KeyframeRecipe| {
+        let shape = formats::read(&key.file)?;
+        Ok(match &cleaning {
+            Some(options) => shape.cleaned(options),
+            None => shape,
+        })
+    };
+    section.keyframes.iter().map(cleaned).collect()
 }
 
 /// Makes the shapes of a recipe ready. Pairs that are to be found are read from `stored` if that
@@ -120,6 +127,7 @@ fn options(recipe: &Recipe, between: Vec<CorrespondenceSource>) -> DataOptions {
             recipe::NormalSource::Estimate => NormalSource::Estimate,
             recipe::NormalSource::None => NormalSource::None,
         },
+        mirrored: section.mirrored,
         seed: recipe.training.seed,
     }
 }

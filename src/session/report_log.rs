@@ -34,8 +34,8 @@ pub(super) fn notes_of(trained: &Trained) -> Vec<String> {
         let Some((_, text)) = line.split_once(' ') else {
             continue;
         };
-        let is_warning =
-            text.contains("the box cuts it off") || text.contains("no zero in the box");
+        let warns = ["the box cuts it off", "no zero in the box", "doubtful: "];
+        let is_warning = warns.iter().any(|known| text.contains(known));
         let note = match text.strip_prefix("note: ") {
             Some(note) => note,
             None if is_warning => text,

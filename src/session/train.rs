@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use isomorph_training::engine::{Engine, Trainer};
 
+use super::against_input::End;
 use super::checkpoint::{Checkpoint, CheckpointError};
 use super::folder::RunFolder;
 use super::learned::{self, Frame};
@@ -241,6 +242,10 @@ impl Session {
                 ..ExtractOptions::of(&self.recipe)
             };
             let frames = trained.extract_into(&options, &self.stop, log, on_event)?;
+            for event in begun.ends.iter().flat_map(|end| end.contradicted(&frames)) {
+                on_event(&event);
+                log.record(&event)?;
+            }
             reported(trained.write_report(frames, None), log, on_event)?;
         } else if self.recipe.result.preview_every > 0 {
             // The last preview would go on loading itself.
@@ -336,6 +341,7 @@ struct Begun {
     log: RunLog,
     learner: Learner,
     frame: Frame,
+    ends: [End; 2],
 }
 
 impl Begun {
@@ -345,6 +351,7 @@ impl Begun {
             run,
             log,
             learner,
+            ends: End::both(&keyframes.keys),
             frame: Frame {
                 normalisation: keyframes.normalisation,
                 bounds: keyframes.bounds,

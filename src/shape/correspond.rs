@@ -4,7 +4,8 @@ use rand::Rng;
 
 use crate::formats::{Shape, ShapeError};
 
-/// Known pairs: indices into the vertices of the source and of the target.
+/// Known pairs: indices into the vertices of the source and of the target as shapes have them. Files have the numbers
+/// of their own vertices, of which a shape may lack some.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Correspondences {
     /// `[source vertex, target vertex]` each.
@@ -26,18 +27,21 @@ impl Correspondences {
     /// # Errors
     /// [`ShapeError::VertexCounts`] if the shapes have different numbers of vertices.
     pub fn same_vertices(source: &Shape, target: &Shape) -> Result<Self, ShapeError> {
-        if source.mesh.vertices.len() != target.mesh.vertices.len() {
+        let (count, target_count) = (source.file_count(), target.file_count());
+        if count != target_count {
             return Err(ShapeError::VertexCounts {
                 source_path: source.path.clone(),
-                source_vertices: source.mesh.vertices.len(),
+                source_vertices: count,
                 target_path: target.path.clone(),
-                target_vertices: target.mesh.vertices.len(),
+                target_vertices: target_count,
             });
         }
+        let both = |number| {
+            let pair = [source, target].map(|shape| shape.vertex_of_number(number));
+            Some([pair[0]?, pair[1]?])
+        };
         Ok(Self {
-            pairs: (0..source.mesh.vertices.len() as u32)
-                .map(|index| [index; 2])
-                .collect(),
+            pairs: (0..count as u32).filter_map(both).collect(),
             ..Self::default()
         })
     }

@@ -4,6 +4,7 @@
 //! normals or estimated ones. Whatever was decided about the data on the way is said in
 //! [`Keyframes::notes`].
 
+use std::borrow::Cow;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::sync::OnceLock;
@@ -14,11 +15,12 @@ use rand_chacha::ChaCha8Rng;
 
 use super::correspond::Correspondences;
 use super::distance::SignedDistance;
+use super::mismatch;
 use super::normalise::Normalisation;
 use super::points::{NormalSource, closed, points_of};
 use super::sample::{point_at, sample_surface};
 use crate::formats::{FEWEST_POINTS, Shape, ShapeError};
-use crate::geometry::{Bounds, Mesh, NeighbourSearch};
+use crate::geometry::{Bounds, Mesh, NeighbourSearch, turned_outwards};
 
 /// Where correspondences come from.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,6 +49,8 @@ pub(crate) struct DataOptions {
     pub correspondence_fraction: f64,
     /// Where normals come from.
     pub normals: NormalSource,
+    /// Whether pairs may mirror a shape.
+    pub mirrored: bool,
     /// Names the samples that are drawn.
     pub seed: u64,
 }
@@ -190,19 +194,34 @@ pub(crate) fn prepare(shapes: &[Shape], options: &DataOptions) -> Result<Keyfram
             allowed: format!("{FEWEST_POINTS} or more"),
         });
     }
-    let normalisation = Normalisation::joint(&shapes.iter().collect::<Vec<_>>())?;
+    let mut notes = Vec::new();
+    let shapes: Vec<Cow<'_, Shape>> = shapes
+        .iter()
+        .map(|shape| wound_outwards(shape, options.normals, &mut notes))
+        .collect();
+    let normalisation = Normalisation::joint(&shapes.iter().map(Cow::as_ref).collect::<Vec<_>>())?;
     let mut between = Vec::with_capacity(options.between.len());
     let mut confidence = Vec::with_capacity(options.between.len());
-    let mut notes = Vec::new();
+    for two in shapes.windows(2) {
+        let two = [two[0].as_ref(), two[1].as_ref()];
+        notes.extend(mismatch::sizes(two)?);
+        notes.extend(mismatch::distance(two));
+    }
     for (k, source) in options.between.iter().enumerate() {
         let rng = Draw::Correspondences(k).generator(options.seed);
         let known = correspondences(
             options,
             source,
-            [&shapes[k], &shapes[k + 1]],
+            [shapes[k].as_ref(), shapes[k + 1].as_ref()],
             rng,
             &mut notes,
         )?;
+        if !options.mirrored && mismatch::are_mirrored(&known.places) {
+            return Err(ShapeError::Mirrored {
+                source_path: shapes[k].path.clone(),
+                target_path: shapes[k + 1].path.clone(),
+            });
+        }
         let place = |(from, to)| (normalisation.apply(from), normalisation.apply(to));
         between.push(known.places.into_iter().map(place).collect());
         confidence.push(known.confidence);
@@ -232,6 +251,44 @@ pub(crate) fn prepare(shapes: &[Shape], options: &DataOptions) -> Result<Keyfram
         normalisation,
         notes,
     })
+}
+
+/// A mesh with all of its pieces wound outwards, unless its own winding is to be kept.
+pub(crate) fn wound_outwards<'a>(
+    shape: &'a Shape,
+    normals: NormalSource,
+    notes: &mut Vec<String>,
+) -> Cow<'a, Shape> {
+    let keeps_winding = matches!(normals, NormalSource::Given | NormalSource::None);
+    let turned = if keeps_winding || !shape.is_mesh() {
+        None
+    } else {
+        turned_outwards(&shape.mesh)
+    };
+    let Some(turned) = turned else {
+        return Cow::Borrowed(shape);
+    };
+    let name = shape.path.display();
+    if turned.against > 0 {
+        let (count, all) = (turned.against, turned.triangles.len());
+        notes.push(format!(
+            "{name}: {count} of {all} triangles are wound against the rest: turned"
+        ));
+    }
+    if turned.whole {
+        notes.push(format!(
+            "{name}: triangles are wound inwards: normals flipped"
+        ));
+    }
+    if turned.pieces > 0 {
+        let count = turned.pieces;
+        notes.push(format!(
+            "{name}: {count} closed parts are wound inwards: turned"
+        ));
+    }
+    let mut shape = shape.clone();
+    shape.mesh.triangles = turned.triangles;
+    Cow::Owned(shape)
 }
 
 /// Corresponding points.

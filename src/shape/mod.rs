@@ -3,11 +3,15 @@
 //! | file | what it does |
 //! |---|---|
 //! | `sample.rs` | area-uniform points on a mesh |
+//! | `exposed.rs` | such points, none of them inside another part of the mesh |
 //! | `solid.rs` | the signed distance of a shape as it is |
 //! | `far.rs` | the same far from its surface, interpolated |
 //! | `distance.rs` | signed distances to points with normals |
 //! | `reconstruct.rs` | a closed mesh from points with normals |
+//! | `clean.rs` | raw scans without what is no part of their surface |
 //! | `normals.rs` | normals of a raw cloud, pointing outwards |
+//! | `sides.rs` | normals of a file held against the cloud |
+//! | `mismatch.rs` | two shapes that may not be in one unit or frame |
 //! | `correspond.rs` | pairs of vertices that are known to correspond |
 //! | `pairs_file.rs` | files of them |
 //! | `normalise.rs` | the joint frame in which the networks work, and the way back |
@@ -19,22 +23,27 @@
 //! Naming rule: a *vertex* is what a file lists (float64, the user's own coordinates, the file's
 //! order, counted from 0); a *point* is what the networks are trained on (float32, normalised).
 
+mod clean;
 mod correspond;
 mod distance;
+mod exposed;
 mod far;
 mod keyframes;
+mod mismatch;
 mod normalise;
 mod normals;
 mod pairs_file;
 mod points;
 mod reconstruct;
 mod sample;
+mod sides;
 mod solid;
 
 pub(crate) use crate::formats::{FEWEST_POINTS, Shape, ShapeError};
 pub(crate) use crate::geometry::{Bounds, NeighbourSearch};
+pub use clean::CleanOptions;
 pub(crate) use correspond::Correspondences;
-pub(crate) use keyframes::{CorrespondenceSource, DataOptions, prepare};
+pub(crate) use keyframes::{CorrespondenceSource, DataOptions, prepare, wound_outwards};
 pub use keyframes::{Keyframe, Keyframes, PointCloud};
 pub(crate) use normalise::Normalisation;
 pub(crate) use normals::estimate_normals;

@@ -63,7 +63,7 @@ pub(crate) fn estimate_normals(points: &[[f64; 3]]) -> EstimatedNormals {
 }
 
 /// The direction in which the neighbours spread least, and the variance along it.
-fn tangent_plane(points: &[[f64; 3]], neighbours: &[Neighbour]) -> ([f64; 3], f64) {
+pub(super) fn tangent_plane(points: &[[f64; 3]], neighbours: &[Neighbour]) -> ([f64; 3], f64) {
     let count = neighbours.len() as f64;
     let places = neighbours.iter().map(|found| points[found.index as usize]);
     let mean = mean(places.clone());

@@ -15,7 +15,9 @@
 use std::path::Path;
 
 use super::correspond::Correspondences;
-use crate::formats::{Array, Arrays, Shape, ShapeError, fields, file_bytes, lines, shown};
+use crate::formats::{
+    Array, Arrays, Shape, ShapeError, fields, file_bytes, lines, refuse_utf_16, shown,
+};
 
 /// Names of arrays in an archive, in lower case.
 const NAMES: [&str; 5] = ["pairs", "correspondences", "matches", "p2p", "map"];
@@ -59,7 +61,9 @@ impl Correspondences {
         let found = if is_array {
             Rows::of_arrays(path)?
         } else {
-            Rows::of_text(path, &file_bytes(path)?)?
+            let bytes = file_bytes(path)?;
+            refuse_utf_16(path, &bytes)?;
+            Rows::of_text(path, &bytes)?
         };
         found.resolve(path, [source, target])
     }
@@ -223,7 +227,7 @@ impl Rows {
 
     /// The pairs, vertices counted from 0, if all of them exist.
     fn resolve(self, path: &Path, shapes: [&Shape; 2]) -> Result<Correspondences, ShapeError> {
-        let counts = shapes.map(|shape| shape.mesh.vertices.len() as u64);
+        let counts = shapes.map(|shape| shape.file_count() as u64);
         if self.is_map && self.count as u64 != counts[0] {
             let (count, needed, name) = (self.count, counts[0], shapes[0].path.display());
             let problem = format!(
@@ -243,6 +247,7 @@ impl Rows {
             ..Correspondences::default()
         };
         let said = self.rows.iter().any(|row| row.confidence.is_some());
+        let mut lost = 0;
         for row in &self.rows {
             // The source's vertices of a map are counted here.
             let firsts = [if self.is_map { 0 } else { first }, first];
@@ -259,10 +264,26 @@ impl Rows {
                     self.wrong(path, row.at, &problem)
                 })? as u32;
             }
-            found.pairs.push(pair);
+            let [from, to] = [0, 1].map(|k| shapes[k].vertex_of_number(pair[k]));
+            let (Some(from), Some(to)) = (from, to) else {
+                lost += 1;
+                continue;
+            };
+            found.pairs.push([from, to]);
             if said {
                 found.confidence.push(row.confidence.unwrap_or(1.0));
             }
+        }
+        let (name, all) = (path.display(), self.rows.len());
+        if lost == all {
+            let problem = format!("all {all} pairs name points that were left out of their clouds");
+            return Err(ShapeError::malformed(path, problem));
+        }
+        if lost > 0 {
+            let note = format!(
+                "{name}: {lost} of {all} pairs name points that were left out: passed over"
+            );
+            found.notes.push(note);
         }
         Ok(found)
     }

@@ -2,8 +2,9 @@
 
 use rand_chacha::ChaCha8Rng;
 
+use super::exposed::sample_exposed;
 use super::normals::estimate_normals;
-use super::sample::sample_surface;
+use super::sides::{self, Sides};
 use crate::formats::{Shape, ShapeError};
 use crate::geometry::winding::is_inside_out;
 use crate::geometry::{EdgeSharing, Mesh};
@@ -48,7 +49,13 @@ pub(crate) fn points_of(
 ) -> Result<Points, ShapeError> {
     let name = shape.path.display();
     let (points, given) = if shape.is_mesh() {
-        let samples = sample_surface(&shape.mesh, count, rng);
+        let (samples, hidden) = sample_exposed(&shape.mesh, count, rng);
+        if hidden > 0.0 {
+            notes.push(format!(
+                "{name}: {:.1} % of the surface lies inside other parts of the mesh, and is left out",
+                100.0 * hidden
+            ));
+        }
         let normals = match wanted {
             NormalSource::Auto => outward(shape, samples.normals, notes),
             _ => Some(samples.normals),
@@ -65,16 +72,11 @@ pub(crate) fn points_of(
         if let (NormalSource::Auto, Err(problem)) = (wanted, &normals) {
             notes.push(format!("{name}: {problem}: estimated from its points"));
         }
-        // Not turned, as a closed mesh's are: of a cloud nobody knows whether it is closed.
-        if let (NormalSource::Auto, Ok(normals)) = (wanted, &normals)
-            && is_inside_out(&shape.mesh.vertices, normals)
-        {
-            notes.push(format!(
-                "{name}: the file's normals point inwards on the whole, and are used as they are; if the \
-                 shape is closed, set data.normals = \"estimate\" or flip them"
-            ));
-        }
-        (shape.mesh.vertices.clone(), normals.ok())
+        let normals = match (wanted, normals) {
+            (NormalSource::Auto, Ok(normals)) => Some(sided(shape, normals, notes)),
+            (_, normals) => normals.ok(),
+        };
+        (shape.mesh.vertices.clone(), normals)
     };
     let normals = match wanted {
         NormalSource::None => None,
@@ -84,6 +86,40 @@ pub(crate) fn points_of(
         }
     };
     Ok((points, normals))
+}
+
+/// A cloud's own normals, turned where the cloud clearly shows that they point inwards.
+fn sided(shape: &Shape, normals: Vec<[f32; 3]>, notes: &mut Vec<String>) -> Vec<[f32; 3]> {
+    let (points, name) = (&shape.mesh.vertices, shape.path.display());
+    let Some(Sides {
+        normals,
+        flipped,
+        mixed,
+        agreement,
+    }) = sides::turned(points, &normals)
+    else {
+        if is_inside_out(points, &normals) {
+            notes.push(format!(
+                "{name}: the file's normals point inwards on the whole, and are used as they are; if the \
+                 shape is closed, set data.normals = \"estimate\" or flip them"
+            ));
+        }
+        return normals;
+    };
+    let all = points.len();
+    if flipped > 0 {
+        notes.push(format!(
+            "{name}: the file's normals point inwards at {flipped} of {all} points: turned over"
+        ));
+    }
+    if mixed > 0 {
+        notes.push(format!(
+            "{name}: the file's normals point in and out ({:.0} % out): turned outwards one by one at {mixed} of {all} \
+             points; data.normals = \"given\" takes them as they are",
+            100.0 * agreement
+        ));
+    }
+    normals
 }
 
 /// A cloud's own normals, or why they do not serve.

@@ -249,7 +249,10 @@ fn options(recipe: &Recipe) -> Options {
         // Of the first level; each further one halves it.
         spacing: keys.spacing * 2.0_f64.powi(steps.len() as i32 - 1),
         steps,
-        time: TimeBasis::Linear,
+        time: match recipe.velocity.time_dependent {
+            true => TimeBasis::Linear,
+            false => TimeBasis::Constant,
+        },
         trajectory_steps: training.time_steps,
         band: keys.band,
         band_spread: training.band_widths.clone(),

@@ -259,7 +259,11 @@ fn carry(
     source: &Path,
     options: &FrameOptions,
 ) -> Result<Vec<Option<String>>, FramesError> {
-    let shape = formats::read(source)?;
+    // An animation has no vertices without a place, a file keeps them.
+    let shape = match options.format {
+        OutputFormat::Animation(_) => formats::read(source)?,
+        OutputFormat::Frames(_) => formats::read_any(source)?,
+    };
     let mut order: Vec<usize> = (0..options.times.len()).collect();
     order.sort_by(|a, b| options.times[*a].total_cmp(&options.times[*b]));
     let times: Vec<f64> = order.iter().map(|k| options.times[*k]).collect();
@@ -288,10 +292,12 @@ pub(crate) fn carried_vertices(
     times: &[f64],
 ) -> Result<Vec<Vec<[f64; 3]>>, FramesError> {
     let vertices = &shape.mesh.vertices;
-    let start: Vec<[f32; 3]> = vertices
-        .iter()
-        .map(|x| learned.normalisation.apply(*x))
-        .collect();
+    // What has no place stays without: it is not moved.
+    let place = |x: &[f64; 3]| match x.iter().all(|part| part.is_finite()) {
+        true => learned.normalisation.apply(*x),
+        false => [0.0; 3],
+    };
+    let start: Vec<[f32; 3]> = vertices.iter().map(place).collect();
     let path = learned.path(&start, times)?;
     // The displacement is added to the vertex as it was read, so that time 0 gives the input back.
     let placed = |now: Vec<[f32; 3]>| {

@@ -27,6 +27,7 @@ mod outputs;
 mod paper;
 mod picking;
 mod progress;
+mod raw_scans;
 mod resume;
 mod samples;
 mod support;

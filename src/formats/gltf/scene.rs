@@ -180,7 +180,7 @@ fn triangles(document: &Document, primitive: &Primitive) -> Result<Vec<[u32; 3]>
         }
         6 => {
             let mut fan = Vec::new();
-            crate::formats::shape::push_fan(&mut fan, &corners);
+            crate::formats::polygons::push_fan(&mut fan, &corners);
             fan
         }
         _ => Vec::new(),

@@ -60,6 +60,7 @@ fn tetrahedra() -> Files {
         points: 1000,
         correspondence_fraction: 0.05,
         normals: NormalSource::Auto,
+        mirrored: false,
         seed: 9,
     };
     let (source, target) = (folder.path().join("a.obj"), folder.path().join("b.obj"));
@@ -193,13 +194,14 @@ fn an_open_mesh_and_one_wound_both_ways_are_noted() {
     std::fs::write(&files.target, turned).expect("written");
     let notes = files.prepared().notes;
     assert!(
-        notes[0].contains("a.obj: the mesh is not closed (3 open edges"),
+        notes[0].contains("b.obj: 1 of 4 triangles are wound against the rest: turned"),
         "{notes:?}"
     );
     assert!(
-        notes[1].contains("b.obj: triangles are wound against each other at 3"),
+        notes[1].contains("a.obj: the mesh is not closed (3 open edges"),
         "{notes:?}"
     );
+    assert_eq!(notes.len(), 2, "b.obj is closed");
 }
 
 #[test]
@@ -214,7 +216,8 @@ fn a_cloud_is_used_as_it_is_with_its_own_normals_or_estimated_ones() {
     // 5 % of the 500 points there are, not of the 1,000 asked of meshes.
     assert_eq!(pair.between[0].len(), 25);
     assert!(
-        pair.notes[0].contains("a.obj: the file's normals point inwards on the whole"),
+        pair.notes[0]
+            .contains("a.obj: the file's normals point inwards at 500 of 500 points: turned over"),
         "{:?}",
         pair.notes
     );
@@ -236,7 +239,7 @@ fn a_cloud_is_used_as_it_is_with_its_own_normals_or_estimated_ones() {
     };
     assert_eq!(
         [outward(&pair.keys[0].cloud), outward(&pair.keys[1].cloud)],
-        [0, 500]
+        [500, 500]
     );
     files.options.normals = NormalSource::Given;
     let text = files.prepare().expect_err("no normals").to_string();
@@ -249,6 +252,43 @@ fn a_cloud_is_used_as_it_is_with_its_own_normals_or_estimated_ones() {
     assert_eq!(
         [outward(&pair.keys[0].cloud), outward(&pair.keys[1].cloud)],
         [500, 500]
+    );
+}
+
+#[test]
+fn pairs_that_mirror_the_shape_are_refused_unless_that_is_meant() {
+    let mut files = tetrahedra();
+    let points = sphere_cloud(500, 2.0, 31);
+    let bent: Vec<_> = points
+        .iter()
+        .map(|[x, y, z]| [*x, *y, z + 0.3 * x * y])
+        .collect();
+    let mirrored: Vec<_> = bent.iter().map(|[x, y, z]| [-x, *y, *z]).collect();
+    write_cloud(&files.source, &bent, None);
+    write_cloud(&files.target, &mirrored, None);
+    let text = files.prepare().expect_err("mirrored").to_string();
+    assert!(
+        text.contains("the pairs mirror") && text.contains("b.obj"),
+        "{text}"
+    );
+    files.options.mirrored = true;
+    assert_eq!(files.prepared().between[0].len(), 25);
+    files.options.mirrored = false;
+    write_cloud(&files.target, &bent, None);
+    assert_eq!(files.prepared().between[0].len(), 25);
+}
+
+#[test]
+fn a_target_in_another_unit_is_said_to_be() {
+    let files = tetrahedra();
+    let points = sphere_cloud(500, 2.0, 31);
+    let metres: Vec<_> = points.iter().map(|p| p.map(|x| x / 1000.0)).collect();
+    write_cloud(&files.source, &points, None);
+    write_cloud(&files.target, &metres, None);
+    let notes = files.prepared().notes;
+    assert!(
+        notes[0].contains("1000.0 times smaller in length than"),
+        "{notes:?}"
     );
 }
 

@@ -24,7 +24,7 @@ pub(super) static SPLINE: MethodSpec = MethodSpec {
     is_baseline: false,
     acts: Acts {
         implicit: Keys::None,
-        velocity: Keys::Only(&["kind"]),
+        velocity: Keys::Only(&["kind", "time-dependent"]),
         loss: Keys::Only(&["matching", "on-surface", "strain", "divergence", "screw"]),
         training: Keys::Only(&[
             "steps",

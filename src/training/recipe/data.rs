@@ -22,7 +22,7 @@ use super::keys::DataKeys;
 use super::rule::{Rule, Value};
 use super::schema::{Key, Keyed};
 use super::setting::Setting;
-use super::words::{Correspondences, NormalSource};
+use super::words::{Cleaning, Correspondences, NormalSource};
 
 /// The key frames and how they become points.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,6 +37,14 @@ pub struct DataRecipe {
     pub correspondence_fraction: f64,
     /// Where the normals of the shapes come from.
     pub normals: NormalSource,
+    /// Whether raw scans are cleaned.
+    pub clean: Cleaning,
+    /// A point is astray if its neighbours are so many times as far as theirs are.
+    pub clean_strays: f64,
+    /// A part far from the rest is left out if it has less than this share of the points.
+    pub clean_part: f64,
+    /// Whether pairs may mirror the shape.
+    pub mirrored: bool,
 }
 
 /// A shape at a time.
@@ -95,6 +103,10 @@ impl DataRecipe {
             points: self.points,
             correspondence_fraction: self.correspondence_fraction,
             normals: self.normals,
+            clean: self.clean,
+            clean_strays: self.clean_strays,
+            clean_part: self.clean_part,
+            mirrored: self.mirrored,
         }
         .to_values()
     }

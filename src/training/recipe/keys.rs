@@ -19,7 +19,7 @@ use isomorph_model::trajectory::Integrator;
 use super::rule::Rule;
 use super::schema::{Key, Keyed, Section, section};
 use super::words::{
-    Activation, Correspondences, DERIVATIVES, GeometryKind, INTEGRATORS, LevelSetForm,
+    Activation, Cleaning, Correspondences, DERIVATIVES, GeometryKind, INTEGRATORS, LevelSetForm,
     NormalSource, Optimiser, Preset, Schedule, TimeSampling, VelocityKind,
 };
 
@@ -81,6 +81,15 @@ section! {
         /// Normals of the shapes: "auto" (those of the file, or estimated), "given", "estimate" or
         /// "none". Without normals the distance field fits forty times worse.
         normals: NormalSource = "auto" | "auto" | "auto" | "auto" | "auto", Rule::word(NormalSource::WORDS);
+        /// Whether raw scans are cleaned. "auto": points in one place, repeated points, stray points and small
+        /// parts far from the rest are left out, and a note says how many. "none": all are used.
+        clean: Cleaning = "auto" | "auto" | "auto" | "auto" | "auto", Rule::word(Cleaning::WORDS);
+        /// A point is astray if its neighbours are so many times as far as theirs are.
+        clean_strays: f64 = 5 | 5 | 5 | 5 | 5, Rule::number(1.5, 1e6);
+        /// A part of a cloud far from the rest is left out if it has less than this share of the points.
+        clean_part: f64 = 5e-3 | 5e-3 | 5e-3 | 5e-3 | 5e-3, Rule::number(0.0, 1.0).zero("keeps all parts");
+        /// Whether pairs may mirror the shape, as left and right hands do. No continuous motion does that.
+        mirrored: bool = false | false | false | false | false, Rule::flag();
     }
 }
 

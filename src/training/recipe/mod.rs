@@ -68,7 +68,7 @@ pub use keys::{
     CheckpointRecipe, ImplicitRecipe, LossRecipe, ResultRecipe, TrainingRecipe, VelocityRecipe,
 };
 pub use words::{
-    Activation, Correspondences, DERIVATIVES, GeometryKind, INTEGRATORS, LevelSetForm,
+    Activation, Cleaning, Correspondences, DERIVATIVES, GeometryKind, INTEGRATORS, LevelSetForm,
     NormalSource, Optimiser, Preset, Schedule, TimeSampling, VelocityKind,
 };
 

@@ -44,9 +44,11 @@ const fn removed(field: &'static str) -> Key {
 }
 
 /// What runs did before there was a key for it, as TOML, whatever their preset says now.
-const BEFORE: [(&str, &str); 2] = [
+const BEFORE: [(&str, &str); 4] = [
     ("training.optimiser", "\"adam\""),
     ("training.guided-until", "0"),
+    ("data.clean", "\"none\""),
+    ("data.mirrored", "true"),
 ];
 
 /// Gives the recipe of a run that an earlier version wrote what it meant without a key.

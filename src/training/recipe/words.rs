@@ -84,6 +84,14 @@ words! {
         None = "none",
     }
 
+    /// Whether raw scans are cleaned.
+    Cleaning {
+        /// What is no part of a surface is left out.
+        Auto = "auto",
+        /// All points are used.
+        None = "none",
+    }
+
     /// The nonlinearity of a network.
     Activation {
         /// `ln(1 + exp(beta x)) / beta`.

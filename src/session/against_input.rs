@@ -1,0 +1,274 @@
+//! The surfaces at the ends of a run held against the shapes that it was given: what contradicts them is said.
+//!
+//! All lengths are in normalised units. The limits are those that no run of the samples and of the evaluation
+//! protocol comes near; a result beyond them is not what was asked for, whatever its cause.
+
+use std::num::NonZeroUsize;
+
+use crate::event::Event;
+use crate::geometry::{Mesh, NeighbourSearch, TriangleSearch};
+use crate::shape::Keyframe;
+use crate::surface::frames::Frame;
+
+/// Places at which distances are taken.
+const PLACES: usize = 4000;
+
+/// The most that the input may be away from the surface, in the mean.
+const REACHED: f64 = 0.01;
+
+/// The most that the surface may be away from a closed mesh, in the mean.
+const BEYOND_MESH: f64 = 0.01;
+
+/// The same from the points of a cloud, whose holes are closed over; so many spacings are added.
+const BEYOND_CLOUD: f64 = 0.03;
+const SPACINGS: f64 = 1.0;
+
+/// How much the volume of a closed mesh may change, as a share.
+const VOLUME: f64 = 0.1;
+
+/// How much its area may change, as a share.
+const AREA: f64 = 0.15;
+
+/// Holes through a surface that its closed mesh does not have: below this many they may be of a cell's size.
+const HOLES: i64 = 3;
+
+/// A shape as it was given, for comparison with the surface at its time.
+pub(super) struct End {
+    name: &'static str,
+    time: f64,
+    points: Vec<[f32; 3]>,
+    mesh: Option<Mesh<f32>>,
+}
+
+impl End {
+    /// The first and the last of the shapes.
+    pub(super) fn both(keys: &[Keyframe]) -> [Self; 2] {
+        let end = |name, key: &Keyframe| Self {
+            name,
+            time: key.time,
+            points: key.cloud.points.clone(),
+            mesh: key.mesh.clone(),
+        };
+        [
+            end("source", &keys[0]),
+            end("target", &keys[keys.len() - 1]),
+        ]
+    }
+
+    /// What of this end's surface contradicts it; nothing if no surface is of its time.
+    pub(super) fn contradicted(&self, frames: &[Frame]) -> Vec<Event> {
+        let own = frames.iter().find(|frame| frame.entry.time == self.time);
+        let Some(frame) = own else {
+            return Vec::new();
+        };
+        let said = self.findings(&frame.mesh, frame.components);
+        let doubtful = |(finding, cure): (String, &str)| Event::Doubtful {
+            finding: format!("the surface at {} {finding}", self.time),
+            cure: cure.to_owned(),
+        };
+        said.into_iter().map(doubtful).collect()
+    }
+
+    fn findings(&self, surface: &Mesh<f32>, pieces: usize) -> Vec<(String, &'static str)> {
+        let name = self.name;
+        let Some(search) = TriangleSearch::new(surface) else {
+            return vec![("is empty".to_owned(), LONGER)];
+        };
+        let mut found = Vec::new();
+        let reached =
+            mean(some(&self.points).map(|x| f64::from(search.closest(*x, 0).squared).sqrt()));
+        if reached > REACHED {
+            found.push((
+                format!("misses the {name} by {reached:.3} in the mean, of a size of about 1"),
+                LONGER,
+            ));
+        }
+        let beyond = self.beyond(surface);
+        let most = if self.mesh.is_some() {
+            BEYOND_MESH
+        } else {
+            BEYOND_CLOUD
+        };
+        if beyond > most {
+            found.push((
+                format!("has parts where the {name} has none: {beyond:.3} from it in the mean"),
+                GHOSTS,
+            ));
+        }
+        if let Some(mesh) = &self.mesh {
+            compare_closed(name, mesh, surface, pieces, &mut found);
+        }
+        found
+    }
+
+    /// How far the surface is from the shape, in the mean.
+    fn beyond(&self, surface: &Mesh<f32>) -> f64 {
+        let of_mesh = self.mesh.as_ref().and_then(TriangleSearch::new);
+        if let Some(search) = of_mesh {
+            let away =
+                some(&surface.vertices).map(|x| f64::from(search.closest(*x, 0).squared).sqrt());
+            return mean(away);
+        }
+        let wide = |x: &[f32; 3]| x.map(f64::from);
+        let points: Vec<[f64; 3]> = self.points.iter().map(wide).collect();
+        let search = NeighbourSearch::new(&points);
+        let three = NonZeroUsize::MIN.saturating_add(2);
+        let spacing = mean(some(&points).map(|x| {
+            let near = search.nearest(*x, three);
+            near.last().map_or(0.0, |last| last.squared_distance.sqrt())
+        }));
+        let away =
+            some(&surface.vertices).map(|x| search.nearest_one(wide(x)).squared_distance.sqrt());
+        (mean(away) - SPACINGS * spacing).max(0.0)
+    }
+}
+
+/// What a surface has otherwise than the closed mesh that it should be.
+fn compare_closed(
+    name: &str,
+    mesh: &Mesh<f32>,
+    surface: &Mesh<f32>,
+    pieces: usize,
+    found: &mut Vec<(String, &'static str)>,
+) {
+    let given = mesh.components_by_place().len();
+    if pieces > given {
+        found.push((
+            format!("is in {pieces} pieces, the {name} in {given}"),
+            GHOSTS,
+        ));
+    }
+    // Parts that pass through each other count twice in the mesh and once in the surface.
+    if given > 1 {
+        return;
+    }
+    let volume = surface.volume() / mesh.volume();
+    if (volume - 1.0).abs() > VOLUME {
+        found.push((
+            format!("has {volume:.2} times the volume of the {name}"),
+            FINER,
+        ));
+    }
+    let area = surface.area() / mesh.area();
+    if (area - 1.0).abs() > AREA {
+        found.push((format!("has {area:.2} times the area of the {name}"), FINER));
+    }
+    let holes = |mesh: &Mesh<f32>, pieces: usize| pieces as i64 - mesh.euler_characteristic() / 2;
+    let (now, before) = (holes(surface, pieces), holes(&welded(mesh), given));
+    if now > before + HOLES {
+        found.push((
+            format!("has {now} holes through it, the {name} {before}"),
+            FINER,
+        ));
+    }
+}
+
+/// A mesh with vertices at one place made one, so that its edges are shared.
+fn welded(mesh: &Mesh<f32>) -> Mesh<f32> {
+    let first = crate::geometry::weld(&mesh.vertices);
+    let name = |vertex: u32| first[vertex as usize];
+    let triangles = mesh.triangles.iter().map(|triangle| triangle.map(name));
+    Mesh::new(mesh.vertices.clone(), triangles.collect())
+}
+
+/// So many of them, evenly chosen.
+fn some<T>(all: &[T]) -> impl Iterator<Item = &T> {
+    all.iter().step_by(all.len().div_ceil(PLACES).max(1))
+}
+
+fn mean(values: impl Iterator<Item = f64>) -> f64 {
+    let (mut sum, mut count) = (0.0, 0);
+    for value in values {
+        sum += value;
+        count += 1;
+    }
+    sum / f64::from(count.max(1))
+}
+
+const LONGER: &str = "train longer (training.steps), or with another preset; if the shape has thin parts, raise \
+     result.resolution";
+const GHOSTS: &str = "look at it; stray points or wrong normals are the usual cause: see `isomorph info` of the file, \
+     and the chapter troubleshooting of the guide";
+const FINER: &str = "raise result.resolution; if it stays, parts are thinner than the points are apart: raise data.points";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::EdgeSharing;
+    use crate::geometry::testing::bumpy_sphere;
+
+    fn narrow(mesh: &Mesh<f64>) -> Mesh<f32> {
+        mesh.moved(|x| x.map(|part| part as f32))
+    }
+
+    fn end(mesh: &Mesh<f64>, closed: bool) -> End {
+        let mesh = narrow(mesh);
+        End {
+            name: "source",
+            time: 0.0,
+            points: mesh.vertices.clone(),
+            mesh: closed.then_some(mesh),
+        }
+    }
+
+    fn said(end: &End, surface: &Mesh<f64>) -> Vec<String> {
+        let surface = narrow(surface);
+        let pieces = surface.components().len();
+        let found = end.findings(&surface, pieces);
+        found.into_iter().map(|(finding, _)| finding).collect()
+    }
+
+    fn together(one: &Mesh<f64>, other: &Mesh<f64>) -> Mesh<f64> {
+        let mut all = one.clone();
+        let first = all.vertices.len() as u32;
+        all.vertices.extend(&other.vertices);
+        let named = other
+            .triangles
+            .iter()
+            .map(|t| t.map(|vertex| vertex + first));
+        all.triangles.extend(named);
+        all
+    }
+
+    #[test]
+    fn a_surface_that_is_its_input_contradicts_nothing() {
+        let ball = bumpy_sphere(40);
+        for closed in [true, false] {
+            assert!(said(&end(&ball, closed), &ball).is_empty());
+            // As coarse as a grid may be.
+            assert!(said(&end(&ball, closed), &bumpy_sphere(24)).is_empty());
+        }
+        assert!(EdgeSharing::of(&welded(&narrow(&ball))).is_closed());
+    }
+
+    #[test]
+    fn a_ghost_a_shrunken_surface_and_an_empty_one_are_named() {
+        let ball = bumpy_sphere(40);
+        let ghost = together(&ball, &ball.moved(|x| x.map(|part| 0.3 * part)));
+        let found = said(&end(&ball, true), &ghost);
+        assert_eq!(found.len(), 2, "{found:?}");
+        assert!(
+            found[0].starts_with("has parts where the source has none"),
+            "{found:?}"
+        );
+        assert!(
+            found[1].starts_with("is in 2 pieces, the source in 1"),
+            "{found:?}"
+        );
+        let found = said(&end(&ball, false), &ghost);
+        assert!(found[0].starts_with("has parts where"), "{found:?}");
+        let small = ball.moved(|x| x.map(|part| 0.9 * part));
+        let found = said(&end(&ball, true), &small);
+        assert!(
+            found[0].starts_with("misses the source by 0.03"),
+            "{found:?}"
+        );
+        assert!(
+            found
+                .iter()
+                .any(|text| text.contains("0.73 times the volume")),
+            "{found:?}"
+        );
+        assert_eq!(said(&end(&ball, true), &Mesh::default()), ["is empty"]);
+    }
+}

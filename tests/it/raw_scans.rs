@@ -1,0 +1,187 @@
+//! Scans as they come: what is no part of a surface is left out, and what cannot be meant is said.
+
+use std::fmt::Write;
+
+use serde_json::Value;
+
+use crate::support::mesh::{Mesh, Point};
+use crate::support::ply;
+use crate::support::workplace::Workplace;
+
+/// A ball of many points.
+fn ball() -> Vec<Point> {
+    Mesh::sphere(1.0, 4).vertices
+}
+
+/// The ball with points that a scanner adds: nothing measured, in one place, and far away.
+fn scan(moved: f64) -> (String, Vec<usize>) {
+    let mut rows: Vec<String> = Vec::new();
+    let mut numbers = Vec::new();
+    for (k, [x, y, z]) in ball().into_iter().enumerate() {
+        if k % 10 == 0 {
+            rows.push("nan nan nan".to_owned());
+            rows.push("9 9 9".to_owned());
+        }
+        numbers.push(rows.len());
+        rows.push(format!("{} {y} {z}", x + moved));
+    }
+    rows.push("-150 20 3".to_owned());
+    let mut text = String::from("ply\nformat ascii 1.0\n");
+    let _ = write!(text, "element vertex {}\n", rows.len());
+    text += "property float x\nproperty float y\nproperty float z\nend_header\n";
+    (text + &rows.join("\n") + "\n", numbers)
+}
+
+#[test]
+fn a_scan_is_cleaned_its_pairs_keep_their_numbers_and_its_surface_is_the_objects() {
+    let place = Workplace::new();
+    let (source, numbers) = scan(0.0);
+    let (target, _) = scan(0.2);
+    place.write("a.ply", &source);
+    place.write("b.ply", &target);
+    let pairs: Vec<String> = numbers
+        .iter()
+        .step_by(4)
+        .map(|k| format!("{k},{k}"))
+        .collect();
+    place.write("pairs.csv", pairs.join("\n"));
+    let args = [
+        "morph",
+        "a.ply",
+        "b.ply",
+        "-o",
+        "run",
+        "--pairs",
+        "pairs.csv",
+        "--preset",
+        "instant",
+    ];
+    let more = [
+        "--frames",
+        "3",
+        "--set",
+        "result.resolution=48",
+        "--strict",
+        "--json",
+    ];
+    let ended = place.isomorph(&[&args[..], &more[..]].concat()).succeeded();
+    let events: Vec<Value> = ended
+        .stdout
+        .lines()
+        .filter_map(|line| serde_json::from_str(line).ok())
+        .collect();
+    let notes: Vec<&str> = events
+        .iter()
+        .filter_map(|event| event["text"].as_str())
+        .collect();
+    let said = |part: &str| notes.iter().any(|note| note.contains(part));
+    assert!(
+        said("points have no place (NaN or infinite): left out"),
+        "{notes:?}"
+    );
+    assert!(said("at the one place (9, 9, 9)"), "{notes:?}");
+    assert!(said("1 astray"), "{notes:?}");
+    // Wrong numbers would pull the ball in all directions.
+    let surfaces: Vec<&Value> = events
+        .iter()
+        .filter(|event| event["event"] == "extracted")
+        .collect();
+    assert_eq!(surfaces.len(), 3, "{notes:?}");
+    assert!(
+        surfaces.iter().all(|event| event["components"] == 1),
+        "{surfaces:?}"
+    );
+    let last = events
+        .iter()
+        .rev()
+        .find(|event| event["event"] == "step")
+        .expect("a step");
+    let terms = last["terms"].as_array().expect("terms");
+    let matching = terms
+        .iter()
+        .find(|term| term["name"] == "matching")
+        .expect("matching");
+    assert!(
+        matching["raw"].as_f64().expect("a number") < 0.003,
+        "{matching}"
+    );
+}
+
+#[test]
+fn clean_leaves_out_what_info_says_and_writes_the_rest() {
+    let place = Workplace::new();
+    place.write("a.ply", scan(0.0).0);
+    let info = place.isomorph(&["info", "a.ply"]).succeeded().stdout;
+    assert!(info.contains("at the one place (9, 9, 9)"), "{info}");
+    let ended = place
+        .isomorph(&["clean", "a.ply", "-o", "b.ply", "--json"])
+        .succeeded();
+    let report: Value = serde_json::from_str(&ended.stdout).expect("JSON");
+    assert_eq!(report["vertices"][1], ball().len(), "{report}");
+    let info = place.isomorph(&["info", "b.ply"]).succeeded().stdout;
+    assert!(!info.contains("note"), "{info}");
+    let refused = place.isomorph(&["clean", "a.ply", "-o", "b.ply", "--strays", "1"]);
+    refused.refused(2, &["--strays 1: must be more than 1"]);
+    let refused = place.isomorph(&["clean", "a.ply", "-o", "b.stl"]);
+    refused.refused(1, &["b.stl"]);
+}
+
+#[test]
+fn a_mirrored_pair_is_refused_before_a_run_is_made() {
+    let place = Workplace::new();
+    let bent = |sign: f64| -> Vec<Point> {
+        ball()
+            .into_iter()
+            .map(|[x, y, z]| [sign * x, y, z + 0.3 * x * y])
+            .collect()
+    };
+    place.write("a.ply", ply::cloud(&bent(1.0)));
+    let mirrored: Vec<Point> = bent(1.0).into_iter().map(|[x, y, z]| [-x, y, z]).collect();
+    place.write("b.ply", ply::cloud(&mirrored));
+    let args = [
+        "morph",
+        "a.ply",
+        "b.ply",
+        "-o",
+        "run",
+        "--pairs",
+        "same-vertices",
+        "--quiet",
+    ];
+    place.isomorph(&args).refused(1, &["the pairs mirror"]);
+    assert!(!place.path("run").exists());
+}
+
+#[test]
+fn a_result_that_is_not_its_input_is_called_so_and_strict_fails() {
+    let place = Workplace::new();
+    place.write("a.ply", ply::cloud(&ball()));
+    place.write("b.ply", ply::cloud(&ball()));
+    // Two steps of networks are no ball.
+    let args = [
+        "morph", "a.ply", "b.ply", "-o", "run", "--preset", "quick", "--pairs", "none", "--frames",
+        "2",
+    ];
+    let few = [
+        "training.steps=2",
+        "training.guided-until=0",
+        "result.resolution=32",
+        "implicit.sphere-radius=0.15",
+    ];
+    let few: Vec<&str> = few.iter().flat_map(|set| ["--set", *set]).collect();
+    let ended = place.isomorph(&[&args[..], &few[..]].concat()).succeeded();
+    assert!(
+        ended.stderr.contains("doubtful: the surface at 0"),
+        "{}",
+        ended.stderr
+    );
+    assert!(
+        !ended.stderr.contains("nothing speaks against"),
+        "{}",
+        ended.stderr
+    );
+    let strict = [&args[..], &few[..], &["--strict", "--force", "--quiet"]].concat();
+    place
+        .isomorph(&strict)
+        .refused(1, &["contradicts the shapes"]);
+}
