@@ -59,10 +59,12 @@ fn problem() -> Problem {
             Cloud {
                 points: source,
                 normals: Some(sphere.clone()),
+                ..Cloud::default()
             },
             Cloud {
                 normals: Some(normals.collect()),
                 points: target,
+                ..Cloud::default()
             },
         ],
     }

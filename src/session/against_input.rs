@@ -9,6 +9,7 @@ use crate::event::Event;
 use crate::geometry::{Mesh, NeighbourSearch, TriangleSearch};
 use crate::shape::Keyframe;
 use crate::surface::frames::Frame;
+use crate::surface::learned::Learned;
 
 /// Places at which distances are taken.
 const PLACES: usize = 4000;
@@ -22,6 +23,12 @@ const BEYOND_MESH: f64 = 0.01;
 /// The same from the points of a cloud, whose holes are closed over; so many spacings are added.
 const BEYOND_CLOUD: f64 = 0.03;
 const SPACINGS: f64 = 1.0;
+
+/// What arrives so many spacings beyond the border of a shape has no counterpart.
+const FREE: f64 = 3.0;
+
+/// Less of a shape is not worth a note.
+const LEAST_SHARE: f64 = 0.02;
 
 /// How much the volume of a closed mesh may change, as a share.
 const VOLUME: f64 = 0.1;
@@ -38,6 +45,8 @@ pub(super) struct End {
     time: f64,
     points: Vec<[f32; 3]>,
     mesh: Option<Mesh<f32>>,
+    /// Whether each point lies at the border of what is known; empty where nothing is missing.
+    border: Vec<bool>,
 }
 
 impl End {
@@ -48,6 +57,7 @@ impl End {
             time: key.time,
             points: key.cloud.points.clone(),
             mesh: key.mesh.clone(),
+            border: key.border.clone(),
         };
         [
             end("source", &keys[0]),
@@ -83,7 +93,11 @@ impl End {
                 LONGER,
             ));
         }
-        let beyond = self.beyond(surface);
+        // Of a shape that is known in part, the surface must have more.
+        let beyond = match self.border.is_empty() {
+            true => self.beyond(surface),
+            false => 0.0,
+        };
         let most = if self.mesh.is_some() {
             BEYOND_MESH
         } else {
@@ -99,6 +113,36 @@ impl End {
             compare_closed(name, mesh, surface, pieces, &mut found);
         }
         found
+    }
+
+    /// What is said of the other end, if a share of it arrives where this shape is not known.
+    pub(super) fn unsupported(&self, other: &Self, learned: &Learned) -> Option<Event> {
+        if self.border.is_empty() {
+            return None;
+        }
+        let some: Vec<[f32; 3]> = some(&other.points).copied().collect();
+        let motion = learned.motion().ok()?;
+        let arrived = motion.carry(&some, other.time, self.time);
+        let wide = |x: &[f32; 3]| x.map(f64::from);
+        let points: Vec<[f64; 3]> = self.points.iter().map(wide).collect();
+        let search = NeighbourSearch::new(&points);
+        let three = NonZeroUsize::MIN.saturating_add(2);
+        let spacing = mean(self::some(&points).map(|x| {
+            let near = search.nearest(*x, three);
+            near.last().map_or(0.0, |last| last.squared_distance.sqrt())
+        }));
+        let is_free = |x: &&[f32; 3]| {
+            let near = search.nearest_one(wide(x));
+            self.border[near.index as usize] && near.squared_distance.sqrt() > FREE * spacing
+        };
+        let share = arrived.iter().filter(is_free).count() as f64 / arrived.len() as f64;
+        let (own, of) = (self.name, other.name);
+        (share > LEAST_SHARE).then(|| {
+            Event::Note(format!(
+                "{:.0} % of the {of} has no counterpart in the {own}: there the motion is a guess from what is near by",
+                100.0 * share
+            ))
+        })
     }
 
     /// How far the surface is from the shape, in the mean.
@@ -208,6 +252,7 @@ mod tests {
             time: 0.0,
             points: mesh.vertices.clone(),
             mesh: closed.then_some(mesh),
+            border: Vec::new(),
         }
     }
 

@@ -47,6 +47,7 @@ fn spheres() -> Keyframes {
             normals: key.normals.clone(),
         },
         mesh: None,
+        border: Vec::new(),
     });
     Keyframes {
         keys: keys.collect(),

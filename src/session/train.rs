@@ -242,7 +242,13 @@ impl Session {
                 ..ExtractOptions::of(&self.recipe)
             };
             let frames = trained.extract_into(&options, &self.stop, log, on_event)?;
-            for event in begun.ends.iter().flat_map(|end| end.contradicted(&frames)) {
+            let [first, last] = &begun.ends;
+            let unsupported = [
+                last.unsupported(first, trained.learned()),
+                first.unsupported(last, trained.learned()),
+            ];
+            let said = begun.ends.iter().flat_map(|end| end.contradicted(&frames));
+            for event in unsupported.into_iter().flatten().chain(said) {
                 on_event(&event);
                 log.record(&event)?;
             }

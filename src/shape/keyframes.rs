@@ -13,6 +13,7 @@ use isomorph_training::data::{KeyPoints, PointPair, Surroundings, TrainingData};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
+use super::border;
 use super::correspond::Correspondences;
 use super::distance::SignedDistance;
 use super::mismatch;
@@ -73,6 +74,8 @@ pub struct Keyframe {
     pub cloud: PointCloud,
     /// The shape itself, normalised and wound outwards, if it is a closed mesh.
     pub(crate) mesh: Option<Mesh<f32>>,
+    /// Whether each point lies at the border of what is known of the shape; empty where nothing is missing.
+    pub(crate) border: Vec<bool>,
 }
 
 /// Two or more shapes at their times, made ready for training.
@@ -239,7 +242,16 @@ pub(crate) fn prepare(shapes: &[Shape], options: &DataOptions) -> Result<Keyfram
         };
         let mesh =
             closed(shape, options.normals).map(|mesh| mesh.moved(|x| normalisation.apply(x)));
-        keys.push(Keyframe { time, cloud, mesh });
+        let border = match (&mesh, &cloud.normals) {
+            (None, Some(normals)) => border::points_at(&cloud.points, normals),
+            _ => Vec::new(),
+        };
+        keys.push(Keyframe {
+            time,
+            cloud,
+            mesh,
+            border,
+        });
     }
     let boxes = keys.iter().map(|key| Bounds::of(&key.cloud.points));
     let bounds = boxes.reduce(|all, next| all.union(&next));

@@ -8,6 +8,7 @@
 //! | `far.rs` | the same far from its surface, interpolated |
 //! | `distance.rs` | signed distances to points with normals |
 //! | `reconstruct.rs` | a closed mesh from points with normals |
+//! | `border.rs` | the border of what is known of a shape, and where it is known |
 //! | `clean.rs` | raw scans without what is no part of their surface |
 //! | `normals.rs` | normals of a raw cloud, pointing outwards |
 //! | `sides.rs` | normals of a file held against the cloud |
@@ -23,6 +24,7 @@
 //! Naming rule: a *vertex* is what a file lists (float64, the user's own coordinates, the file's
 //! order, counted from 0); a *point* is what the networks are trained on (float32, normalised).
 
+mod border;
 mod clean;
 mod correspond;
 mod distance;

@@ -6,6 +6,7 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use super::border::{Known, KnownSearch};
 use super::far::FarField;
 use super::keyframes::Keyframe;
 use super::reconstruct::reconstruct;
@@ -34,6 +35,9 @@ pub(crate) struct SolidParts {
     /// Whether parts of it may lie inside others: of a file's mesh, not of the zero set of a field.
     #[serde(default = "unknown")]
     pub may_overlap: bool,
+    /// Where the shape is known, if it is not everywhere.
+    #[serde(default)]
+    pub known: Option<Known>,
 }
 
 /// Checkpoints of before do not say.
@@ -48,6 +52,7 @@ impl SolidParts {
             points: mesh.vertices,
             triangles: mesh.triangles,
             may_overlap,
+            known: Known::of(&key.cloud.points, &key.border),
         };
         match &key.mesh {
             Some(mesh) => Some(of(mesh.clone(), true)),
@@ -63,7 +68,11 @@ impl SolidParts {
         let count = self.points.len();
         let finite = |rows: &[[f32; 3]]| rows.as_flattened().iter().all(|part| part.is_finite());
         let named = self.triangles.as_flattened().iter();
-        count > 0 && finite(&self.points) && named.clone().all(|&index| (index as usize) < count)
+        let known = self.known.as_ref().is_none_or(Known::is_whole);
+        known
+            && count > 0
+            && finite(&self.points)
+            && named.clone().all(|&index| (index as usize) < count)
     }
 }
 
@@ -72,6 +81,7 @@ pub(crate) struct Solid {
     parts: SolidParts,
     exact: Exact,
     far: FarField,
+    known: Option<KnownSearch>,
 }
 
 /// What an exact distance takes.
@@ -92,12 +102,23 @@ impl Solid {
         let overlaps = parts.may_overlap && overlaps(&search);
         let exact = Exact { search, overlaps };
         let far = FarField::new(&parts.points, |places| exact.distances(places));
-        Some(Self { parts, exact, far })
+        let known = parts.known.as_ref().map(Known::arranged);
+        Some(Self {
+            parts,
+            exact,
+            far,
+            known,
+        })
     }
 
     /// What it is made from.
     pub(crate) fn parts(&self) -> &SolidParts {
         &self.parts
+    }
+
+    /// How far the shape is known about each of the places, 0 to 1; `None` where it is so everywhere.
+    pub(crate) fn known_at(&self, places: &[[f32; 3]]) -> Option<Vec<f32>> {
+        self.known.as_ref().map(|known| known.at(places))
     }
 
     /// The signed distance at each of the places, negative inside.
@@ -195,6 +216,7 @@ mod tests {
                 .collect(),
             triangles: mesh.triangles.clone(),
             may_overlap: true,
+            known: None,
         }
     }
 

@@ -5,6 +5,13 @@
 //! ```
 //!
 //! as with the default method, `g` and `h` being the signed distances of the shapes themselves.
+//!
+//! Where one of the shapes is not known, beyond the border of a scan or in a hole, the other one alone decides. With
+//! `a` and `b` as how far they are known there, 0 to 1, the weight of `h` is, instead of `t`,
+//!
+//! ```text
+//! t a b + t (1 - a) (1 - b) + (1 - a) b
+//! ```
 
 use std::sync::Arc;
 
@@ -54,17 +61,37 @@ impl CarriedShapes {
         time: f64,
         distances: impl Fn(&Solid, &[[f32; 3]]) -> Vec<f32>,
     ) -> Vec<f32> {
+        let places = [0, 1].map(|end: usize| -> Vec<[f32; 3]> {
+            let place = |both: &[f32; 6]| [both[3 * end], both[3 * end + 1], both[3 * end + 2]];
+            ends.iter().map(place).collect()
+        });
+        let weights = self.weights([&places[0], &places[1]], time);
         let of = |end: usize| {
-            if has_no_weight(end, time) {
+            if weights.is_none() && has_no_weight(end, time) {
                 return vec![0.0; ends.len()];
             }
-            let place = |both: &[f32; 6]| [both[3 * end], both[3 * end + 1], both[3 * end + 2]];
-            let places: Vec<[f32; 3]> = ends.iter().map(place).collect();
-            distances(&self.shapes[end], &places)
+            distances(&self.shapes[end], &places[end])
         };
-        let (g, h, t) = (of(0), of(1), time as f32);
-        let blend = |(g, h): (&f32, &f32)| (1.0 - t) * g + t * h;
-        g.iter().zip(&h).map(blend).collect()
+        let (g, h) = (of(0), of(1));
+        let weight = |k: usize| weights.as_ref().map_or(time as f32, |weights| weights[k]);
+        let blend = |(k, (g, h)): (usize, (&f32, &f32))| (1.0 - weight(k)) * g + weight(k) * h;
+        g.iter().zip(&h).enumerate().map(blend).collect()
+    }
+
+    /// The weight of the second shape at each place, given where it comes from and goes to; `None` where it is the time
+    /// everywhere.
+    fn weights(&self, places: [&[[f32; 3]]; 2], time: f64) -> Option<Vec<f32>> {
+        let [a, b] = [0, 1].map(|end: usize| self.shapes[end].known_at(places[end]));
+        if a.is_none() && b.is_none() {
+            return None;
+        }
+        let t = time as f32;
+        let known = |of: &Option<Vec<f32>>, k: usize| of.as_ref().map_or(1.0, |of| of[k]);
+        let weight = |k: usize| {
+            let (a, b) = (known(&a, k), known(&b, k));
+            t * a * b + t * (1.0 - a) * (1.0 - b) + (1.0 - a) * b
+        };
+        Some((0..places[0].len()).map(weight).collect())
     }
 
     fn carry_to(&self, points: &[[f32; 3]], from: f64, to: f64) -> Vec<[f32; 3]> {
@@ -89,11 +116,16 @@ impl SurfaceField for CarriedShapes {
     }
 
     /// The gradient of each distance where the point comes from, carried back by the transpose of the motion's
-    /// derivative: that of the integrator's own steps, so that it is the gradient of [`Self::values`].
+    /// derivative: that of the integrator's own steps, so that it is the gradient of [`Self::values`], but for the
+    /// weights where a shape is not known, which count as constant.
     fn gradients(&self, points: &[[f32; 3]], time: f64) -> Vec<[f32; 3]> {
-        let [g, h] = [0, 1].map(|end: usize| {
-            if has_no_weight(end, time) {
-                return vec![[0.0; 3]; points.len()];
+        let is_known = self
+            .shapes
+            .iter()
+            .all(|shape| shape.parts().known.is_none());
+        let [(g, from), (h, to)] = [0, 1].map(|end: usize| {
+            if is_known && has_no_weight(end, time) {
+                return (vec![[0.0; 3]; points.len()], Vec::new());
             }
             let (shape, until) = (&self.shapes[end], end as f64);
             let steps = self.share(time, until);
@@ -105,11 +137,19 @@ impl SurfaceField for CarriedShapes {
             let back = slopes
                 .zip(&there)
                 .map(|(n, carried)| transposed(&carried.gradient, n));
-            back.collect::<Vec<_>>()
+            (back.collect::<Vec<_>>(), places)
         });
-        let t = time as f32;
-        let blend = |(g, h): (&[f32; 3], &[f32; 3])| [0, 1, 2].map(|i| (1.0 - t) * g[i] + t * h[i]);
-        g.iter().zip(&h).map(blend).collect()
+        let weights = if is_known {
+            None
+        } else {
+            self.weights([&from, &to], time)
+        };
+        let weight = |k: usize| weights.as_ref().map_or(time as f32, |weights| weights[k]);
+        let blend = |(k, (g, h)): (usize, (&[f32; 3], &[f32; 3]))| {
+            let t = weight(k);
+            [0, 1, 2].map(|i| (1.0 - t) * g[i] + t * h[i])
+        };
+        g.iter().zip(&h).enumerate().map(blend).collect()
     }
 
     fn carried(&self) -> Option<&dyn CarriedField> {

@@ -211,6 +211,7 @@ fn problem(recipe: &Recipe, keyframes: &Keyframes) -> Problem {
         Cloud {
             points: cloud.points.clone(),
             normals: cloud.normals.clone(),
+            border: keyframes.keys[k].border.clone(),
         }
     };
     // At most so many, evenly chosen: they come in no order that means anything.

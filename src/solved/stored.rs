@@ -61,7 +61,12 @@ pub(super) fn read(
         spacing: stored.spacing,
         cells: stored.cells,
     };
-    let field = SplineField::from_parts(grid, TimeBasis::Linear, &stored.coefficients);
+    let nodes: usize = grid.cells.iter().map(|count| *count as usize + 2).product();
+    let time = match stored.coefficients.len() == 3 * nodes {
+        true => TimeBasis::Constant,
+        false => TimeBasis::Linear,
+    };
+    let field = SplineField::from_parts(grid, time, &stored.coefficients);
     let field = field.map_err(|error| damaged(FIELD, error.to_string()))?;
     Ok((field, stored.step, one(records, ENDS)?))
 }

@@ -29,7 +29,7 @@ fn info_measures_a_mesh() {
     // Exact: 2 (1/4 + 1/2 + 1/8) and 1/8, and the same with more digits.
     assert_eq!(
         (field(&text, "area"), field(&text, "volume")),
-        ("1.750000", "0.125000")
+        ("1.75000", "0.125000")
     );
     assert_eq!(field(&text, "closed"), "yes");
     let open = Mesh {
@@ -51,7 +51,7 @@ fn info_reads_an_obj_of_quadrilaterals_and_a_cloud() {
     let text = place.isomorph(&["info", "square.obj"]).succeeded().stdout;
     assert_eq!(
         (field(&text, "triangles"), field(&text, "area")),
-        ("2", "4.000000")
+        ("2", "4.00000")
     );
     place.write("cloud.ply", ply::cloud(&Mesh::sphere(1.0, 5).vertices));
     let text = place.isomorph(&["info", "cloud.ply"]).succeeded().stdout;

@@ -9,6 +9,9 @@ pub struct Cloud {
     pub points: Vec<[f32; 3]>,
     /// The outward unit normal of each point, if known.
     pub normals: Option<Vec<[f32; 3]>>,
+    /// Whether each point lies at the border of what is known of the surface; empty: none does. What arrives there
+    /// may have no counterpart, so the on-surface term leaves it free (Turk and Levoy, 1994).
+    pub border: Vec<bool>,
 }
 
 /// Points of the first shape and where they are on the second.
@@ -43,6 +46,9 @@ impl Problem {
             if let Some(normals) = &cloud.normals {
                 check_length("normals", normals.len(), cloud.points.len())?;
                 check_finite("normal", normals)?;
+            }
+            if !cloud.border.is_empty() {
+                check_length("border", cloud.border.len(), cloud.points.len())?;
             }
         }
         let pairs = &self.pairs;

@@ -38,10 +38,12 @@ fn ellipsoid(count: usize, pairs: usize) -> Problem {
             Cloud {
                 points: source,
                 normals: Some(sphere.iter().map(|&x| narrow(x)).collect()),
+                ..Cloud::default()
             },
             Cloud {
                 points: target,
                 normals: Some(sphere.iter().map(|&x| normal(x)).collect()),
+                ..Cloud::default()
             },
         ],
     }
@@ -138,6 +140,7 @@ fn a_motion_along_a_screw_is_recovered() {
             .normals
             .as_ref()
             .map(|n| n.iter().map(|&x| turned(x)).collect()),
+        ..Cloud::default()
     };
     problem.shapes[0] = ellipsoid.clone();
     let options = Options {
@@ -265,6 +268,7 @@ fn odd_shapes_give_finite_fields() {
     let cloud = |points: Vec<[f32; 3]>, up: bool| Cloud {
         normals: up.then(|| vec![[0.0, 0.0, 1.0]; points.len()]),
         points,
+        ..Cloud::default()
     };
     let flat = [cloud(square(0.0), true), cloud(square(0.0), false)];
     let tiny = ellipsoid(64, 0).shapes;
@@ -279,6 +283,7 @@ fn odd_shapes_give_finite_fields() {
         Cloud {
             normals: Some(vec![[0.0; 3]; points.len()]),
             points,
+            ..Cloud::default()
         }
     }];
     for shapes in [flat, tiny, coincident, one, no_normal] {
@@ -373,4 +378,45 @@ fn single_precision_is_enough() {
     let ((narrow, _), (wide, _)) = (run::<f32>(), run::<f64>());
     // Conjugate gradients end at .03 of the residual, perhaps an iteration apart.
     assert!((narrow - wide).abs() < 2e-2 * wide, "{narrow} {wide}");
+}
+
+#[test]
+fn what_arrives_at_a_border_is_left_free() {
+    // The second shape is the first, but for all that is right of a cut: without a border that is drawn to the cut.
+    let whole = ellipsoid(3000, 0);
+    let source = whole.shapes[0].clone();
+    let left = |x: &[f32; 3]| x[0] < 0.05;
+    let kept: Vec<usize> = (0..source.points.len())
+        .filter(|k| left(&source.points[*k]))
+        .collect();
+    let normals = source.normals.as_ref().expect("normals");
+    let mut cut = Cloud {
+        points: kept.iter().map(|k| source.points[*k]).collect(),
+        normals: Some(kept.iter().map(|k| normals[*k]).collect()),
+        border: kept.iter().map(|k| source.points[*k][0] > 0.02).collect(),
+    };
+    let drawn = |cut: Cloud| {
+        let shapes = [source.clone(), cut];
+        let problem = Problem {
+            shapes,
+            ..Problem::default()
+        };
+        let (field, _) = solve(problem, quick()).expect("finite");
+        let right: Vec<[f32; 3]> = source
+            .points
+            .iter()
+            .filter(|x| x[0] > 0.15)
+            .copied()
+            .collect();
+        let moved = field.carry(&right, 0.0, 1.0, 4);
+        let ways = moved
+            .iter()
+            .zip(&right)
+            .map(|(a, b)| f64::from((a[0] - b[0]).abs()));
+        ways.sum::<f64>() / right.len() as f64
+    };
+    let free = drawn(cut.clone());
+    cut.border.clear();
+    let held = drawn(cut);
+    assert!(free < 0.01 && held > 4.0 * free, "{free} {held}");
 }

@@ -8,7 +8,8 @@
 //! Distances become squares by iteratively reweighted least squares: `|r|` has the weight
 //! `1 / sqrt(r^2 + scale^2)`. A surface without normals has the distance `|r|` itself. With normals on both
 //! sides, the weight is also multiplied by the cosine between the carried normal and the found one, or 0:
-//! a front does not stick to a back.
+//! a front does not stick to a back. What arrives at the border of what is known of the other surface has no weight: it
+//! may have no counterpart there.
 
 use kiddo::SquaredEuclidean;
 use kiddo::immutable::float::kdtree::ImmutableKdTree;
@@ -31,6 +32,7 @@ pub(crate) struct Surface {
     tree: ImmutableKdTree<f64, u32, 3, BUCKET>,
     points: Vec<[f64; 3]>,
     normals: Option<Vec<[f64; 3]>>,
+    border: Vec<bool>,
 }
 
 impl Surface {
@@ -43,6 +45,7 @@ impl Surface {
         Self {
             tree: ImmutableKdTree::new_from_slice(&points),
             normals: cloud.normals.as_ref().map(unit),
+            border: cloud.border.clone(),
             points,
         }
     }
@@ -242,6 +245,7 @@ impl Found {
         let nearest = other.nearest(end);
         let normal = other.normals.as_ref().map(|normals| normals[nearest]);
         let agreement = match (&own.normals, normal) {
+            _ if other.border.get(nearest) == Some(&true) => 0.0,
             (Some(own), Some(found)) => {
                 dot(carried_normal(gradient, own[at]), found).clamp(0.0, 1.0)
             }
