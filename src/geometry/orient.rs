@@ -82,6 +82,9 @@ pub(crate) fn turned_outwards(mesh: &Mesh<f64>) -> Option<Turned> {
     })
 }
 
+/// A side of a triangle: the triangle, which of its sides, and whether it runs from the lower vertex to the higher.
+type Side = (u32, u8, bool);
+
 /// Which triangles share an edge with which.
 struct Links {
     /// For each side of each triangle, the triangle beyond, and whether it is wound alike; none beyond an edge of one
@@ -96,7 +99,7 @@ impl Links {
         let welded = weld(&mesh.vertices);
         let count = mesh.triangles.len();
         // For each edge its first two sides, and how many there are.
-        let mut edges: FxHashMap<(u32, u32), ([(u32, u8, bool); 2], u32)> = FxHashMap::default();
+        let mut edges: FxHashMap<(u32, u32), ([Side; 2], u32)> = FxHashMap::default();
         edges.reserve(count * 2);
         let mut has_area = vec![true; count];
         for (t, triangle) in mesh.triangles.iter().enumerate() {

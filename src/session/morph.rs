@@ -234,7 +234,7 @@ impl MorphWatch {
 }
 
 const GIVE_PAIRS: &str = "give a few pairs of points by hand with --pairs FILE (a line `source_index,target_index` \
-     for each), above all at tips of limbs";
+     for each), above all at tips of limbs; where one shape lacks parts of the other, --pairs none is often better";
 const FINER: &str = "try --set result.resolution=384; if it stays so, parts that touch at one end are torn: give \
      pairs there with --pairs FILE";
 const LONGER: &str = "try --preset default, which takes minutes, or give pairs with --pairs FILE";

@@ -95,7 +95,7 @@ impl Shape {
 fn clean_cloud(shape: Shape, options: &CleanOptions) -> Shape {
     let mut left_out = Vec::new();
     let mut now = shape.clone();
-    let steps: [&dyn Fn(&[[f64; 3]]) -> Step; 5] = [
+    let steps: [&Criterion<'_>; 5] = [
         &heaps,
         &repeats,
         &|points| strays(points, options.strays),
@@ -124,6 +124,9 @@ fn clean_cloud(shape: Shape, options: &CleanOptions) -> Shape {
     now.notes.push(note);
     now
 }
+
+/// What finds points that are no part of the surface.
+type Criterion<'a> = dyn Fn(&[[f64; 3]]) -> Step + 'a;
 
 /// What a step leaves out.
 struct Step {

@@ -203,7 +203,7 @@ pub(crate) fn prepare(shapes: &[Shape], options: &DataOptions) -> Result<Keyfram
         .map(|shape| wound_outwards(shape, options.normals, &mut notes))
         .collect();
     let normalisation = Normalisation::joint(&shapes.iter().map(Cow::as_ref).collect::<Vec<_>>())?;
-    let mut between = Vec::with_capacity(options.between.len());
+    let mut between: Vec<Vec<PointPair>> = Vec::with_capacity(options.between.len());
     let mut confidence = Vec::with_capacity(options.between.len());
     for two in shapes.windows(2) {
         let two = [two[0].as_ref(), two[1].as_ref()];
@@ -220,10 +220,7 @@ pub(crate) fn prepare(shapes: &[Shape], options: &DataOptions) -> Result<Keyfram
             &mut notes,
         )?;
         if !options.mirrored && mismatch::are_mirrored(&known.places) {
-            return Err(ShapeError::Mirrored {
-                source_path: shapes[k].path.clone(),
-                target_path: shapes[k + 1].path.clone(),
-            });
+            return Err(mirrored([&shapes[k], &shapes[k + 1]]));
         }
         let place = |(from, to)| (normalisation.apply(from), normalisation.apply(to));
         between.push(known.places.into_iter().map(place).collect());
@@ -233,6 +230,7 @@ pub(crate) fn prepare(shapes: &[Shape], options: &DataOptions) -> Result<Keyfram
     for (k, (shape, &time)) in shapes.iter().zip(&options.times).enumerate() {
         let mut rng = Draw::Points(k).generator(options.seed);
         notes.extend(shape.notes.iter().cloned());
+        notes.extend(mismatch::sheet(shape));
         let (points, normals) =
             points_of(shape, options.points, options.normals, &mut rng, &mut notes)?;
         let points = points.into_iter().map(|point| normalisation.apply(point));
@@ -253,6 +251,15 @@ pub(crate) fn prepare(shapes: &[Shape], options: &DataOptions) -> Result<Keyfram
             border,
         });
     }
+    for (k, pairs) in between.iter().enumerate() {
+        let clouds = [&keys[k].cloud, &keys[k + 1].cloud];
+        // Normals as they are given need not be on one side.
+        let are_outward = matches!(options.normals, NormalSource::Auto | NormalSource::Estimate);
+        let may_be = options.mirrored || !are_outward;
+        if !may_be && mismatch::are_turned_over(pairs, clouds) {
+            return Err(mirrored([&shapes[k], &shapes[k + 1]]));
+        }
+    }
     let boxes = keys.iter().map(|key| Bounds::of(&key.cloud.points));
     let bounds = boxes.reduce(|all, next| all.union(&next));
     Ok(Keyframes {
@@ -263,6 +270,13 @@ pub(crate) fn prepare(shapes: &[Shape], options: &DataOptions) -> Result<Keyfram
         normalisation,
         notes,
     })
+}
+
+fn mirrored([source, target]: [&Shape; 2]) -> ShapeError {
+    ShapeError::Mirrored {
+        source_path: source.path.clone(),
+        target_path: target.path.clone(),
+    }
 }
 
 /// A mesh with all of its pieces wound outwards, unless its own winding is to be kept.

@@ -1,8 +1,15 @@
 //! Two shapes that may not be what they seem to each other: in another unit, or mirrored.
 
+use std::num::NonZeroUsize;
+
+use isomorph_training::data::PointPair;
+
+use super::keyframes::PointCloud;
 use crate::formats::{Shape, ShapeError};
-use crate::geometry::Mesh;
-use crate::geometry::linear::{add_outer, difference, dot, mean, symmetric_eigen};
+use crate::geometry::linear::{
+    add, add_outer, cross, difference, dot, mean, symmetric_eigen, unit,
+};
+use crate::geometry::{EdgeSharing, Mesh, NeighbourSearch};
 
 /// Shapes whose lengths differ by more than this are said to.
 const SIZES: f64 = 3.5;
@@ -63,7 +70,7 @@ pub(super) fn are_mirrored(pairs: &[([f64; 3], [f64; 3])]) -> bool {
         square += dot(x, x) + dot(y, y);
     }
     let (a, b, c) = (covariance[0], covariance[1], covariance[2]);
-    let determinant = dot(a, crate::geometry::linear::cross(b, c));
+    let determinant = dot(a, cross(b, c));
     // The squares of the singular values.
     let product = |i: usize, j: usize| (0..3).map(|k| covariance[k][i] * covariance[k][j]).sum();
     let gram: [[f64; 3]; 3] = [0, 1, 2].map(|i| [0, 1, 2].map(|j| product(i, j)));
@@ -75,6 +82,102 @@ pub(super) fn are_mirrored(pairs: &[([f64; 3], [f64; 3])]) -> bool {
     let best = left(most + middle + least);
     let other = left(most + middle - least);
     determinant < 0.0 && best < MIRRORED * other
+}
+
+/// Pairs of which the surface about is looked at.
+const LOOKED_AT: usize = 300;
+
+/// Neighbouring pairs that say how the surface maps there.
+const NEIGHBOURS: usize = 16;
+
+/// Pairs are mirrored if at this share of them the surface is turned over.
+const TURNED_OVER: f64 = 0.8;
+
+/// A map that flattens the surface to less than this share says nothing of its side.
+const FLAT: f64 = 0.05;
+
+/// Whether pairs map the surface of one shape to that of the other seen from behind, as a mirror does: about a pair, a
+/// turn to the left becomes one to the right, outside up. This also shows where a shape is nearly its own mirror image.
+pub(super) fn are_turned_over(pairs: &[PointPair], clouds: [&PointCloud; 2]) -> bool {
+    let [Some(source), Some(target)] = clouds.map(|cloud| cloud.normals.as_ref()) else {
+        return false;
+    };
+    if pairs.len() <= 2 * NEIGHBOURS {
+        return false;
+    }
+    let wide = |x: [f32; 3]| x.map(f64::from);
+    let search = clouds.map(|cloud| {
+        let points: Vec<[f64; 3]> = cloud.points.iter().map(|x| wide(*x)).collect();
+        NeighbourSearch::new(&points)
+    });
+    let from: Vec<[f64; 3]> = pairs.iter().map(|pair| wide(pair.0)).collect();
+    let around = NeighbourSearch::new(&from);
+    let count = NonZeroUsize::MIN.saturating_add(NEIGHBOURS);
+    let side = |k: usize| -> Option<bool> {
+        let to = wide(pairs[k].1);
+        let normal = |side: usize, normals: &[[f32; 3]], x| {
+            normals[search[side].nearest_one(x).index as usize]
+        };
+        let [e, f] = [normal(0, source, from[k]), normal(1, target, to)].map(tangents);
+        let flat = |[u, v]: [[f64; 3]; 2], x: [f64; 3]| [dot(u, x), dot(v, x)];
+        // Least squares of the map of the plane: M sum(x x^T) = sum(y x^T).
+        let (mut square, mut mapped) = ([[0.0; 2]; 2], [[0.0; 2]; 2]);
+        for near in &around.nearest(from[k], count)[1..] {
+            let other = near.index as usize;
+            let x = flat(e, difference(from[other], from[k]));
+            let y = flat(f, difference(wide(pairs[other].1), to));
+            for i in 0..2 {
+                for j in 0..2 {
+                    square[i][j] += x[i] * x[j];
+                    mapped[i][j] += y[i] * x[j];
+                }
+            }
+        }
+        let area = |m: [[f64; 2]; 2]| m[0][0] * m[1][1] - m[0][1] * m[1][0];
+        let factor = area(mapped) / area(square);
+        (factor.abs() > FLAT && factor.is_finite()).then_some(factor < 0.0)
+    };
+    let step = pairs.len().div_ceil(LOOKED_AT);
+    let sides: Vec<bool> = (0..pairs.len()).step_by(step).filter_map(side).collect();
+    let over = sides.iter().filter(|over| **over).count();
+    sides.len() > NEIGHBOURS && over as f64 > TURNED_OVER * sides.len() as f64
+}
+
+/// Two directions at right angles to a normal and to each other, so that the second lies to the left of the first seen
+/// from outside.
+fn tangents(normal: [f32; 3]) -> [[f64; 3]; 2] {
+    let normal = normal.map(f64::from);
+    let axis = match normal[0].abs() < 0.8 {
+        true => [1.0, 0.0, 0.0],
+        false => [0.0, 1.0, 0.0],
+    };
+    let across = unit(cross(normal, axis)).map(f64::from);
+    [across, cross(normal, across)]
+}
+
+/// The sum of the area vectors of a mesh is nothing if it is closed, half of the area for half a sphere, and more for a
+/// sheet.
+const SHEET: f64 = 0.6;
+
+/// What is said of a mesh that encloses nothing.
+pub(super) fn sheet(shape: &Shape) -> Option<String> {
+    if !shape.is_mesh() || EdgeSharing::of(&shape.mesh).is_closed() {
+        return None;
+    }
+    let vectors = shape
+        .mesh
+        .triangles
+        .iter()
+        .map(|t| shape.mesh.area_vector(*t));
+    let sum = vectors.fold([0.0; 3], add);
+    let share = dot(sum, sum).sqrt() / 2.0 / shape.mesh.area();
+    (share > SHEET).then(|| {
+        format!(
+            "{}: an open sheet has no inside: its surfaces are closed behind it by a cushion, which may reach the box; use \
+             the carried mesh (--carry), which is the sheet itself",
+            shape.path.display()
+        )
+    })
 }
 
 /// The bounding boxes of shapes that are far apart, in words.
@@ -124,7 +227,7 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::geometry::testing::{random_places, tetrahedron};
+    use crate::geometry::testing::{bumpy_sphere, random_places, tetrahedron};
 
     fn shape(name: &str, scale: f64, along: f64) -> Shape {
         let mesh = tetrahedron(0.0).moved(|[x, y, z]| [scale * x + along, scale * y, scale * z]);
@@ -172,6 +275,64 @@ mod tests {
             .collect();
         assert!(!are_mirrored(&flat));
         assert!(!are_mirrored(&pairs(&|[x, y, z]| [-x, y, z])[..7]));
+    }
+
+    #[test]
+    fn a_mirror_shows_in_the_surface_also_where_the_shape_is_its_own_mirror_image() {
+        let ball = bumpy_sphere(30).moved(|[x, y, z]| [0.4 * x, y, z]);
+        let cloud = |to: &dyn Fn([f64; 3]) -> [f64; 3], flip: bool| {
+            let mut mesh = ball.moved(to);
+            if flip {
+                mesh.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+            }
+            PointCloud {
+                points: mesh
+                    .vertices
+                    .iter()
+                    .map(|x| x.map(|part| part as f32))
+                    .collect(),
+                normals: Some(mesh.vertex_normals()),
+            }
+        };
+        let source = cloud(&|x| x, false);
+        let found = |target: &PointCloud, at: &dyn Fn(usize) -> usize| {
+            let pairs = (0..source.points.len()).step_by(3);
+            let pairs: Vec<PointPair> = pairs
+                .map(|k| (source.points[k], target.points[at(k)]))
+                .collect();
+            are_turned_over(&pairs, [&source, target])
+        };
+        let bent = |[x, y, z]: [f64; 3]| [x + 0.5 * y * y, y, z];
+        assert!(!found(&cloud(&bent, false), &|k| k));
+        let mirrored = |x: [f64; 3]| {
+            let [x, y, z] = bent(x);
+            [-x, y, z]
+        };
+        let target = cloud(&mirrored, true);
+        assert!(found(&target, &|k| k));
+        // Pairs that are wrong everywhere say nothing.
+        let count = source.points.len();
+        assert!(!found(&target, &|k| (k * 7919) % count));
+        let without = PointCloud {
+            normals: None,
+            ..target
+        };
+        assert!(!found(&without, &|k| k));
+    }
+
+    #[test]
+    fn a_sheet_is_told_from_a_mesh_with_holes() {
+        let mut ball = bumpy_sphere(20);
+        let of = |mesh: &Mesh<f64>| sheet(&Shape::at(Path::new("a.ply"), mesh.clone()));
+        assert_eq!(of(&ball), None);
+        let half = ball.triangles.len() / 2;
+        ball.triangles.drain(..half / 5);
+        assert_eq!(of(&ball), None, "a hole");
+        ball.triangles.truncate(half / 3);
+        assert!(
+            of(&ball).expect("said").contains("an open sheet"),
+            "a band at its edge"
+        );
     }
 
     #[test]

@@ -27,7 +27,7 @@ fn scan(moved: f64) -> (String, Vec<usize>) {
     }
     rows.push("-150 20 3".to_owned());
     let mut text = String::from("ply\nformat ascii 1.0\n");
-    let _ = write!(text, "element vertex {}\n", rows.len());
+    let _ = writeln!(text, "element vertex {}", rows.len());
     text += "property float x\nproperty float y\nproperty float z\nend_header\n";
     (text + &rows.join("\n") + "\n", numbers)
 }

@@ -96,10 +96,8 @@ impl Extent {
     };
 
     fn include(&mut self, point: [f64; 3]) {
-        for axis in 0..3 {
-            self.low[axis] = self.low[axis].min(point[axis]);
-            self.high[axis] = self.high[axis].max(point[axis]);
-        }
+        self.low = [0, 1, 2].map(|axis| self.low[axis].min(point[axis]));
+        self.high = [0, 1, 2].map(|axis| self.high[axis].max(point[axis]));
     }
 
     fn diagonal(&self) -> f64 {
