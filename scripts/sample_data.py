@@ -7,11 +7,16 @@ SEQUENCES is the folder that holds fox_survey.anime and human_raise_arms.anime (
 data/README.md); DATA is where the pairs go (default: data/ beside scripts/). Standard library only.
 The same sequences give the same bytes. Layout of .anime: src/formats/anime.rs.
 
+scan/ holds what a scanner gives: clouds of the fox with points that are none.
+
 Per pair: source.ply and target.ply (binary, with faces, without normals) and pairs.csv. The
 sequences are vertex-consistent, which no scan is; so that the files give away no more than
 pairs.csv says, the vertices and the triangles of the target are in a random order of their own.
 """
 
+import bisect
+import itertools
+import math
 import random
 import struct
 import sys
@@ -49,12 +54,13 @@ def read_sequence(path, wanted):
 
 
 def write_ply(path, vertices, faces, comment):
-    """A binary little-endian PLY of float32 positions and triangles."""
+    """A binary little-endian PLY of float32 positions, and of triangles if there are any."""
+    of_faces = f"element face {len(faces)}\nproperty list uchar int vertex_indices\n" if faces else ""
     header = (
         "ply\nformat binary_little_endian 1.0\n"
         f"comment {comment}\n"
         f"element vertex {len(vertices)}\nproperty float x\nproperty float y\nproperty float z\n"
-        f"element face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n"
+        f"{of_faces}end_header\n"
     )
     body = b"".join(struct.pack("<3f", *vertex) for vertex in vertices)
     body += b"".join(struct.pack("<B3i", 3, *face) for face in faces)
@@ -93,6 +99,52 @@ def make(folder, sequence, first, last):
     print(f"{folder}: {len(source)} vertices, {len(faces)} triangles, {PAIRS} pairs")
 
 
+def surface_points(vertices, faces, count, rng):
+    """Points uniform over the area."""
+    corners = [[vertices[corner] for corner in face] for face in faces]
+
+    def area(a, b, c):
+        u, v = ([q - p for p, q in zip(a, end)] for end in (b, c))
+        cross = (u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0])
+        return math.sqrt(sum(part * part for part in cross))
+
+    running = list(itertools.accumulate(area(*triangle) for triangle in corners))
+
+    def point():
+        a, b, c = corners[bisect.bisect(running, rng.random() * running[-1]) % len(corners)]
+        root, split = math.sqrt(rng.random()), rng.random()
+        weights = (1 - root, root * (1 - split), root * split)
+        return tuple(sum(w * p for w, p in zip(weights, at)) for at in zip(a, b, c))
+
+    return [point() for _ in range(count)]
+
+
+def raw_scan(points, rng):
+    """The points as a depth camera gives them: some without a place, some at the camera, some astray."""
+    low, high = (tuple(least(at) for at in zip(*points)) for least in (min, max))
+    nothing = (math.nan,) * 3
+    camera = (high[0] + 400.0, low[1], 0.0)
+    astray = lambda: tuple(rng.uniform(a - 20, b + 20) for a, b in zip(low, high))
+    rows = [*points, *[nothing] * 250, *[camera] * 150, *(astray() for _ in range(50))]
+    rng.shuffle(rows)
+    return rows
+
+
+def make_scans(folder, sequence):
+    """Writes two raw scans of the fox, and a scan of its front alone."""
+    rng = random.Random("isomorph scan")
+    (first, last), faces = read_sequence(sequence, (0, 18))
+    scans = [surface_points(frame, faces, 5000, rng) for frame in (first, last)]
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, points in zip(("a.ply", "b.ply"), scans):
+        write_ply(folder / name, raw_scan(points, rng), [], "see data/README.md")
+    # The long axis of the fox is z, and its head is at the far end.
+    low, high = (least(at[2] for at in scans[1]) for least in (min, max))
+    front = [at for at in scans[1] if at[2] > low + 0.4 * (high - low)]
+    write_ply(folder / "part.ply", front, [], "see data/README.md")
+    print(f"{folder}: two raw scans, and {len(front)} points of a part")
+
+
 def main():
     if len(sys.argv) not in (2, 3):
         sys.exit(__doc__)
@@ -100,6 +152,7 @@ def main():
     data = Path(sys.argv[2]) if len(sys.argv) == 3 else Path(__file__).parents[1] / "data"
     for name, sequence, first, last in SAMPLES:
         make(data / name, sequences / sequence, first, last)
+    make_scans(data / "scan", sequences / "fox_survey.anime")
 
 
 if __name__ == "__main__":

@@ -35,7 +35,8 @@ class Declarations(unittest.TestCase):
     def test_the_paper_is_covered(self):
         names = {experiment.name for experiment in experiments.EXPERIMENTS}
         wanted = "errors correspondences local-swaps global-swaps level-set divergence smoothness "
-        wanted += "sparse incomplete topology no-correspondences ablation"
+        wanted += "sparse incomplete topology no-correspondences ablation "
+        wanted += "instant-parts instant-inputs instant-volume large-turns"
         self.assertEqual(names, set(wanted.split()))
 
     def test_labels_are_unique_and_survive_the_command_line(self):
@@ -188,6 +189,25 @@ class Experiments(unittest.TestCase):
                 self.assertEqual(status, 0, err)
                 xml.parse(self.folder / "out" / name / "figure.svg")
 
+    def test_experiments_of_presets_take_them_as_they_are(self):
+        status, _, err = self.paper("large-turns")
+        self.assertEqual(status, 0, err)
+        calls = self.calls()
+        self.assertEqual(len(calls), 4)
+        words = calls[0]
+        self.assertFalse([word for word in words if "training.steps=" in word])
+        self.assertIn("quick=quick", words)
+        turned = sequences.read_sequence(self.folder / "cache/bar_turn_90.anime")
+        ends = turned.frames[0], turned.frames[-1]
+        # A quarter turn: the way of a vertex is sqrt(2) times its distance from the axis.
+        axis = np.array([1, 2, 3]) / np.sqrt(14)
+        away = [end - np.outer(end @ axis, axis) for end in ends]
+        self.assertLess(np.abs((away[0] * away[1]).sum(axis=1)).max(), 1e-6)
+        self.assertAlmostEqual(turned.volume(0), 0.144, places=6)
+        self.assertAlmostEqual(turned.volume(4), 0.144, places=6)
+        table = (self.folder / "out/large-turns/table.md").read_text()
+        self.assertIn("the steps and points of their presets", table)
+
     def test_the_same_numbers_give_the_same_bytes(self):
         self.paper("sparse")
         kept = {path: path.read_bytes() for path in (self.folder / "cache").rglob("*.ply")}
@@ -212,7 +232,7 @@ class Experiments(unittest.TestCase):
         status, out, _ = self.paper("all", "--dry-run")
         self.assertEqual(status, 0)
         self.assertEqual(set(self.folder.rglob("*")), before)
-        self.assertEqual(out.count(" compare --sequence "), 21)
+        self.assertEqual(out.count(" compare --sequence "), 31)
         self.assertIn("# errors: 46 runs", out)
 
     def test_the_commands_of_a_dry_run_are_those_that_are_run(self):

@@ -198,10 +198,11 @@ def markdown(name: str, content: dict, measured: list[Measured]) -> str:
     parts += content.get("notes", [])
     settings = content.get("settings")
     if settings:
-        parts.append(
-            f"Rows had {settings['steps']:,} steps of {settings['batch']:,} points, "
-            f"seed {settings['seed']}. {record.made_by(content)}"
-        )
+        steps, batch = settings["steps"], settings["batch"]
+        had = "the steps and points of their presets"
+        if steps is not None:
+            had = f"{steps:,} steps of {batch:,} points"
+        parts.append(f"Rows had {had}, seed {settings['seed']}. {record.made_by(content)}")
     else:
         parts += made_by_compare(content, measured)
     return "\n\n".join(parts) + "\n"

@@ -36,6 +36,21 @@ pub(crate) fn squared_spacing(found: &[Neighbour]) -> f64 {
     found[SPACING.min(found.len() - 1)].squared_distance
 }
 
+/// The distance of a point from its third neighbour, in the median: about the spacing of the points.
+///
+/// # Panics
+/// If there are no points.
+pub(crate) fn usual_spacing(points: &[[f64; 3]]) -> f64 {
+    let count = NonZeroUsize::MIN.saturating_add(SPACING);
+    let found = NeighbourSearch::new(points).nearest_of_each(points, count);
+    let mut spacings: Vec<f64> = found
+        .iter()
+        .map(|near| squared_spacing(near).sqrt())
+        .collect();
+    let middle = spacings.len() / 2;
+    *spacings.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
 /// The area that each point stands for: `pi r_k^2 / k` with its k-th neighbour at `r_k`, k = 6.
 ///
 /// `neighbours` are those of each point, itself first; fewer than k are taken as they are.
@@ -87,5 +102,14 @@ mod tests {
         let grid = cloud_area(&grid.collect::<Vec<_>>()) / 10_000.0;
         assert!(grid > PI / 4.0 && grid < 1.06 * PI / 4.0, "{grid}");
         assert_eq!(cloud_area(&[[0.0; 3]; 8]), 0.0);
+    }
+
+    #[test]
+    fn the_spacing_of_a_grid_is_that_of_its_lines_wherever_one_point_lies() {
+        let grid = (0..10_000).map(|i| [f64::from(i % 100), f64::from(i / 100), 0.0]);
+        let mut points: Vec<[f64; 3]> = grid.collect();
+        points.push([1e6; 3]);
+        assert_eq!(usual_spacing(&points), 1.0);
+        assert_eq!(usual_spacing(&[[3.0; 3]]), 0.0);
     }
 }

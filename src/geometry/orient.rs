@@ -215,22 +215,7 @@ fn solid_angle(corners: [[f64; 3]; 3], place: [f64; 3]) -> f64 {
 mod tests {
     use super::*;
     use crate::geometry::EdgeSharing;
-    use crate::geometry::testing::{bumpy_sphere, cuboid};
-
-    /// Meshes as one, side by side or in each other.
-    fn together(meshes: &[Mesh<f64>]) -> Mesh<f64> {
-        let mut all = Mesh::default();
-        for mesh in meshes {
-            let first = all.vertices.len() as u32;
-            all.vertices.extend(&mesh.vertices);
-            let named = mesh
-                .triangles
-                .iter()
-                .map(|t| t.map(|vertex| vertex + first));
-            all.triangles.extend(named);
-        }
-        all
-    }
+    use crate::geometry::testing::{bumpy_sphere, cuboid, together};
 
     fn flipped(mut mesh: Mesh<f64>) -> Mesh<f64> {
         mesh.triangles.iter_mut().for_each(|t| t.swap(1, 2));

@@ -32,6 +32,21 @@ pub(crate) fn cuboid(edges: [f64; 3]) -> Mesh<f64> {
     )
 }
 
+/// Meshes as one, side by side or in each other.
+pub(crate) fn together(meshes: &[Mesh<f64>]) -> Mesh<f64> {
+    let mut all = Mesh::default();
+    for mesh in meshes {
+        let first = all.vertices.len() as u32;
+        all.vertices.extend(&mesh.vertices);
+        let named = mesh
+            .triangles
+            .iter()
+            .map(|t| t.map(|vertex| vertex + first));
+        all.triangles.extend(named);
+    }
+    all
+}
+
 /// Points uniform on the sphere of this radius about the origin.
 pub(crate) fn sphere_cloud(count: usize, radius: f64, seed: u64) -> Vec<[f64; 3]> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);

@@ -3,6 +3,7 @@
 //! | chapter | what it is for |
 //! |---|---|
 //! | [`first_steps`] | from nothing to a first result, and what to look at |
+//! | [`worked_jobs`] | three jobs from files to an animation, with commands, pictures and times |
 //! | [`shapes`] | files, normals, correspondences, coordinates |
 //! | [`recipes`] | the settings of a run: presets, sections, the ten keys that people change |
 //! | [`results`] | what a run leaves, how to measure it, and how good the method is |
@@ -20,6 +21,11 @@
 pub mod first_steps {
     #![doc = include_str!("links.txt")]
     #![doc = include_str!("first_steps.md")]
+}
+
+pub mod worked_jobs {
+    #![doc = include_str!("links.txt")]
+    #![doc = include_str!("worked_jobs.md")]
 }
 
 pub mod shapes {

@@ -3,9 +3,8 @@
 //! All lengths are in normalised units. The limits are those that no run of the samples and of the evaluation
 //! protocol comes near; a result beyond them is not what was asked for, whatever its cause.
 
-use std::num::NonZeroUsize;
-
 use crate::event::Event;
+use crate::geometry::density::usual_spacing;
 use crate::geometry::{Mesh, NeighbourSearch, TriangleSearch};
 use crate::shape::Keyframe;
 use crate::surface::frames::Frame;
@@ -126,11 +125,7 @@ impl End {
         let wide = |x: &[f32; 3]| x.map(f64::from);
         let points: Vec<[f64; 3]> = self.points.iter().map(wide).collect();
         let search = NeighbourSearch::new(&points);
-        let three = NonZeroUsize::MIN.saturating_add(2);
-        let spacing = mean(self::some(&points).map(|x| {
-            let near = search.nearest(*x, three);
-            near.last().map_or(0.0, |last| last.squared_distance.sqrt())
-        }));
+        let spacing = usual_spacing(&points);
         let is_free = |x: &&[f32; 3]| {
             let near = search.nearest_one(wide(x));
             self.border[near.index as usize] && near.squared_distance.sqrt() > FREE * spacing
@@ -156,11 +151,7 @@ impl End {
         let wide = |x: &[f32; 3]| x.map(f64::from);
         let points: Vec<[f64; 3]> = self.points.iter().map(wide).collect();
         let search = NeighbourSearch::new(&points);
-        let three = NonZeroUsize::MIN.saturating_add(2);
-        let spacing = mean(some(&points).map(|x| {
-            let near = search.nearest(*x, three);
-            near.last().map_or(0.0, |last| last.squared_distance.sqrt())
-        }));
+        let spacing = usual_spacing(&points);
         let away =
             some(&surface.vertices).map(|x| search.nearest_one(wide(x)).squared_distance.sqrt());
         (mean(away) - SPACINGS * spacing).max(0.0)
@@ -239,7 +230,7 @@ const FINER: &str = "raise result.resolution; if it stays, parts are thinner tha
 mod tests {
     use super::*;
     use crate::geometry::EdgeSharing;
-    use crate::geometry::testing::bumpy_sphere;
+    use crate::geometry::testing::{bumpy_sphere, together};
 
     fn narrow(mesh: &Mesh<f64>) -> Mesh<f32> {
         mesh.moved(|x| x.map(|part| part as f32))
@@ -263,18 +254,6 @@ mod tests {
         found.into_iter().map(|(finding, _)| finding).collect()
     }
 
-    fn together(one: &Mesh<f64>, other: &Mesh<f64>) -> Mesh<f64> {
-        let mut all = one.clone();
-        let first = all.vertices.len() as u32;
-        all.vertices.extend(&other.vertices);
-        let named = other
-            .triangles
-            .iter()
-            .map(|t| t.map(|vertex| vertex + first));
-        all.triangles.extend(named);
-        all
-    }
-
     #[test]
     fn a_surface_that_is_its_input_contradicts_nothing() {
         let ball = bumpy_sphere(40);
@@ -289,7 +268,7 @@ mod tests {
     #[test]
     fn a_ghost_a_shrunken_surface_and_an_empty_one_are_named() {
         let ball = bumpy_sphere(40);
-        let ghost = together(&ball, &ball.moved(|x| x.map(|part| 0.3 * part)));
+        let ghost = together(&[ball.clone(), ball.moved(|x| x.map(|part| 0.3 * part))]);
         let found = said(&end(&ball, true), &ghost);
         assert_eq!(found.len(), 2, "{found:?}");
         assert!(

@@ -9,6 +9,7 @@ use std::num::NonZeroUsize;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use crate::geometry::density::usual_spacing;
 use crate::geometry::linear::{cross, difference, dot, unit};
 use crate::geometry::{Neighbour, NeighbourSearch};
 
@@ -97,15 +98,7 @@ impl Known {
             return None;
         }
         let wide: Vec<[f64; 3]> = points.iter().map(|x| x.map(f64::from)).collect();
-        let all = NeighbourSearch::new(&wide);
-        let near = all.nearest_of_each(&wide, AROUND);
-        let mut spacings: Vec<f64> = near
-            .iter()
-            .filter_map(|found| found.last())
-            .map(|found| found.squared_distance.sqrt())
-            .collect();
-        let middle = spacings.len() / 2;
-        let full = FULL * *spacings.select_nth_unstable_by(middle, f64::total_cmp).1;
+        let full = FULL * usual_spacing(&wide);
         let away = NeighbourSearch::new(&at).nearest_one_of_each(&wide);
         let weight = |found: &Neighbour| {
             let part = (found.squared_distance.sqrt() / full).min(1.0);

@@ -95,19 +95,7 @@ mod tests {
     use rand::SeedableRng;
 
     use super::*;
-    use crate::geometry::testing::cuboid;
-
-    fn both(one: &Mesh<f64>, other: &Mesh<f64>) -> Mesh<f64> {
-        let mut all = one.clone();
-        let first = all.vertices.len() as u32;
-        all.vertices.extend(&other.vertices);
-        let named = other
-            .triangles
-            .iter()
-            .map(|t| t.map(|vertex| vertex + first));
-        all.triangles.extend(named);
-        all
-    }
+    use crate::geometry::testing::{cuboid, together};
 
     fn sampled(mesh: &Mesh<f64>) -> (SurfaceSamples, f64) {
         sample_exposed(mesh, 2000, &mut ChaCha8Rng::seed_from_u64(1))
@@ -119,7 +107,7 @@ mod tests {
         let away = |x: [f64; 3]| [x[0] + 4e5, x[1] - 5e6, x[2]];
         let one = cuboid([3.0, 1.0, 1.0]).moved(away);
         let other = cuboid([1.0, 3.0, 1.2]).moved(|[x, y, z]| away([x + 1.0, y - 1.0, z - 0.1]));
-        let (samples, hidden) = sampled(&both(&one, &other));
+        let (samples, hidden) = sampled(&together(&[one, other]));
         assert_eq!(samples.points.len(), 2000);
         // Four faces of 1 by 1 of the first lie in the second, two of 1 by 1 of the second in the first.
         let share = 6.0 / (14.0 + 2.0 * (3.0 + 1.2 + 3.6));
@@ -138,7 +126,9 @@ mod tests {
         let mut inner = cuboid([1.0; 3]).moved(|x| x.map(|part| part + 0.5));
         inner.triangles.iter_mut().for_each(|t| t.swap(1, 2));
         let apart = ball.moved(|[x, y, z]| [x + 5.0, y, z]);
-        for mesh in [both(&ball, &inner), both(&ball, &apart), ball] {
+        let hollow = together(&[ball.clone(), inner]);
+        let two = together(&[ball.clone(), apart]);
+        for mesh in [hollow, two, ball] {
             assert_eq!(sampled(&mesh).1, 0.0);
         }
     }

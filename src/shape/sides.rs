@@ -5,8 +5,9 @@
 //! at which the cloud clearly shows its outside ([`estimate_normals`]). The lines of the file are kept.
 
 use super::normals::{EstimatedNormals, estimate_normals};
+use crate::geometry::density::usual_spacing;
 use crate::geometry::linear::dot;
-use crate::geometry::{NeighbourSearch, parts_apart};
+use crate::geometry::parts_apart;
 
 /// Certainties from this on, up or down, are called clear.
 pub(crate) const CLEAR: f64 = 0.25;
@@ -41,7 +42,7 @@ pub(super) struct Sides {
 pub(super) fn turned(points: &[[f64; 3]], normals: &[[f32; 3]]) -> Option<Sides> {
     assert_eq!(points.len(), normals.len(), "a normal for each point");
     let estimate = estimate_normals(points);
-    let part_of = parts_apart(points, APART * spacing(points));
+    let part_of = parts_apart(points, APART * usual_spacing(points));
     let count = part_of.iter().max().map_or(0, |last| last + 1);
     let mut tallies = vec![Tally::default(); count];
     for (k, part) in part_of.iter().enumerate() {
@@ -85,16 +86,6 @@ fn agrees(estimate: &EstimatedNormals, normals: &[[f32; 3]], k: usize) -> bool {
         normals[k].map(f64::from),
         estimate.normals[k].map(f64::from),
     ) >= 0.0
-}
-
-/// The median distance of a point from its nearest neighbours.
-fn spacing(points: &[[f64; 3]]) -> f64 {
-    let few = std::num::NonZeroUsize::MIN.saturating_add(4);
-    let found = NeighbourSearch::new(points).nearest_of_each(points, few);
-    let farthest = found.iter().filter_map(|near| near.last());
-    let mut lengths: Vec<f64> = farthest.map(|near| near.squared_distance.sqrt()).collect();
-    let middle = lengths.len() / 2;
-    *lengths.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 /// The points of a part.

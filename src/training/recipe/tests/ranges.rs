@@ -11,6 +11,8 @@ const ENDS: &str = r#"
 data.keys                      [0,1]   [-1,1]   [9,10000000] [9,10000001]
 data.points                    64      63       10000000 10000001
 data.correspondence-fraction   1e-9    0        1        1.001
+data.clean-strays              1.5     1.4      1000000  1000001
+data.clean-part                0       -1e-9    1        1.001
 spline.spacing                 0.01     0.009    1        1.001
 spline.coarse-shares           [0]      [-1e-9]  [0.9]    [0.901]
 spline.band                    100      99       10000000 10000001

@@ -11,7 +11,7 @@ fn any_number(range: Range) -> BoxedStrategy<f64> {
     // Above every key's preset, below single precision's infinity.
     let high = range.high.min(1e30);
     let low = if range.above { 1e-12 } else { range.low };
-    prop_oneof![low..=high, low..=high.min(1.0), Just(high)].boxed()
+    prop_oneof![low..=high, low..=high.min(1.0).max(low), Just(high)].boxed()
 }
 
 fn any_value(kind: Kind) -> BoxedStrategy<Value> {

@@ -7,6 +7,14 @@ use crate::method::spec_of;
 const FLOW: &str = include_str!("version-0.1-flow.toml");
 const NISE: &str = include_str!("version-0.1-nise.toml");
 
+/// What runs did before there were keys for it.
+const THEN: [&str; 4] = [
+    "training.optimiser=adam",
+    "training.guided-until=0",
+    "data.clean=none",
+    "data.mirrored=true",
+];
+
 fn stored(text: &str) -> (Recipe, Vec<String>) {
     Recipe::parse_stored(text, Path::new("/run/recipe.toml")).expect("a recipe of a run")
 }
@@ -23,6 +31,8 @@ fn a_recipe_of_version_0_1_is_the_preset_that_it_was() {
         "training.steps=1000",
         "training.optimiser=adam",
         "training.guided-until=0",
+        "data.clean=none",
+        "data.mirrored=true",
         "checkpoint.every=200",
     ];
     // The preset's other values that act have not changed since.
@@ -65,9 +75,8 @@ fn train_says_which_lines_of_such_a_recipe_to_delete() {
     let left = left.filter(|(index, _)| !lines.contains(&(index + 1)));
     let left: Vec<&str> = left.map(|(_, line)| line).collect();
     // Later keys have the values of the preset there, and those of earlier runs here.
-    let then = ["training.optimiser=adam", "training.guided-until=0"];
     assert_eq!(
-        parsed(&left.join("\n"), &then).expect("a recipe"),
+        parsed(&left.join("\n"), &THEN).expect("a recipe"),
         stored(FLOW).0
     );
 }
@@ -76,8 +85,7 @@ fn train_says_which_lines_of_such_a_recipe_to_delete() {
 fn what_a_later_version_added_is_left_out_with_a_note() {
     let text = format!("{SHAPES}colour = true\n[clean]\nholes = 3\n");
     let (recipe, notes) = stored(&text);
-    let then = ["training.optimiser=adam", "training.guided-until=0"];
-    assert_eq!(recipe, parsed(SHAPES, &then).expect("a recipe"));
+    assert_eq!(recipe, parsed(SHAPES, &THEN).expect("a recipe"));
     assert_eq!(notes.len(), 2, "{notes:?}");
     assert!(
         notes[0].starts_with("/run/recipe.toml:4: data.colour: no such key"),
