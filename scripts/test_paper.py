@@ -232,7 +232,7 @@ class Experiments(unittest.TestCase):
         status, out, _ = self.paper("all", "--dry-run")
         self.assertEqual(status, 0)
         self.assertEqual(set(self.folder.rglob("*")), before)
-        self.assertEqual(out.count(" compare --sequence "), 31)
+        self.assertEqual(out.count(" compare --sequence "), 30)
         self.assertIn("# errors: 46 runs", out)
 
     def test_the_commands_of_a_dry_run_are_those_that_are_run(self):

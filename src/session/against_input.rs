@@ -35,8 +35,11 @@ const VOLUME: f64 = 0.1;
 /// How much its area may change, as a share.
 const AREA: f64 = 0.15;
 
-/// Holes through a surface that its closed mesh does not have: below this many they may be of a cell's size.
-const HOLES: i64 = 3;
+/// Holes through a surface that its closed mesh does not have: up to so many, fingers that touch may make.
+const HOLES: i64 = 12;
+
+/// Pieces with less than this share of the area may be tips that a cell cuts off.
+const PIECE: f64 = 0.01;
 
 /// A shape as it was given, for comparison with the surface at its time.
 pub(super) struct End {
@@ -70,7 +73,7 @@ impl End {
         let Some(frame) = own else {
             return Vec::new();
         };
-        let said = self.findings(&frame.mesh, frame.components);
+        let said = self.findings(&frame.mesh);
         let doubtful = |(finding, cure): (String, &str)| Event::Doubtful {
             finding: format!("the surface at {} {finding}", self.time),
             cure: cure.to_owned(),
@@ -78,7 +81,7 @@ impl End {
         said.into_iter().map(doubtful).collect()
     }
 
-    fn findings(&self, surface: &Mesh<f32>, pieces: usize) -> Vec<(String, &'static str)> {
+    fn findings(&self, surface: &Mesh<f32>) -> Vec<(String, &'static str)> {
         let name = self.name;
         let Some(search) = TriangleSearch::new(surface) else {
             return vec![("is empty".to_owned(), LONGER)];
@@ -109,7 +112,7 @@ impl End {
             ));
         }
         if let Some(mesh) = &self.mesh {
-            compare_closed(name, mesh, surface, pieces, &mut found);
+            compare_closed(name, mesh, surface, &mut found);
         }
         found
     }
@@ -163,13 +166,15 @@ fn compare_closed(
     name: &str,
     mesh: &Mesh<f32>,
     surface: &Mesh<f32>,
-    pieces: usize,
     found: &mut Vec<(String, &'static str)>,
 ) {
     let given = mesh.components_by_place().len();
-    if pieces > given {
+    let all = surface.components();
+    let least = PIECE * all.iter().map(|piece| piece.area).sum::<f64>();
+    let large = all.iter().filter(|piece| piece.area >= least).count();
+    if large > given {
         found.push((
-            format!("is in {pieces} pieces, the {name} in {given}"),
+            format!("is in {large} pieces, the {name} in {given}"),
             GHOSTS,
         ));
     }
@@ -189,7 +194,7 @@ fn compare_closed(
         found.push((format!("has {area:.2} times the area of the {name}"), FINER));
     }
     let holes = |mesh: &Mesh<f32>, pieces: usize| pieces as i64 - mesh.euler_characteristic() / 2;
-    let (now, before) = (holes(surface, pieces), holes(&welded(mesh), given));
+    let (now, before) = (holes(surface, all.len()), holes(&welded(mesh), given));
     if now > before + HOLES {
         found.push((
             format!("has {now} holes through it, the {name} {before}"),
@@ -249,8 +254,7 @@ mod tests {
 
     fn said(end: &End, surface: &Mesh<f64>) -> Vec<String> {
         let surface = narrow(surface);
-        let pieces = surface.components().len();
-        let found = end.findings(&surface, pieces);
+        let found = end.findings(&surface);
         found.into_iter().map(|(finding, _)| finding).collect()
     }
 
