@@ -348,7 +348,7 @@ EXPERIMENTS += (
             Row("grid: spacing .1", keys=("spline.spacing=0.1",)),
             Row("grid: spacing .07", keys=("spline.spacing=0.07",)),
             Row("grid: spacing .035", keys=("spline.spacing=0.035",)),
-            Row("grid: no coarse levels", keys=("spline.coarse-shares=[]",)),
+            Row("grid: no coarse levels", keys=("spline.coarse-shares=[0]",)),
             Row("V: stationary", keys=("velocity.time-dependent=false",)),
             Row("quadrature: 6000 samples", keys=("spline.band=6000",)),
             Row("quadrature: 96000 samples", keys=("spline.band=96000",)),

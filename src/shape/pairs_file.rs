@@ -7,7 +7,8 @@
 //! | 3 | the same and a confidence from 0 to 1, which `isomorph match` writes; it may be missing on some lines |
 //!
 //! Numbers in text are separated by commas, semicolons, spaces or tabs. Empty lines, lines that start with `#` and one
-//! line of column names before the first are passed over. A vertex may occur more than once.
+//! line of column names before the first are passed over. A column before the others without a name is passed over too,
+//! where the others have names. Whole numbers may be written as `12.0`. A vertex may occur more than once.
 //!
 //! Vertices count from 0, in the order of their files. They count from 1 if a comment says `# counted from 1`, or if
 //! none is 0 and one is the number of the vertices; then a note says so.
@@ -103,7 +104,7 @@ impl Correspondences {
 impl Rows {
     fn of_text(path: &Path, bytes: &[u8]) -> Result<Self, ShapeError> {
         let mut found = Self::default();
-        let mut names_allowed = true;
+        let (mut names_allowed, mut has_index) = (true, false);
         for (at, line) in lines(bytes) {
             if let Some(comment) = line.strip_prefix('#') {
                 let is = |first: u64| {
@@ -114,10 +115,15 @@ impl Rows {
                 found.declared = found.declared.or(is(0)).or(is(1));
                 continue;
             }
-            if std::mem::take(&mut names_allowed) && line.starts_with(char::is_alphabetic) {
+            let mut fields: Vec<&str> = fields(&line).collect();
+            if std::mem::take(&mut names_allowed) && are_names(&fields) {
+                // As pandas writes its index: a column without a name.
+                has_index = fields.len() > 2 && unquoted(fields[0]).is_empty();
                 continue;
             }
-            let fields: Vec<&str> = fields(&line).collect();
+            if has_index && !fields.is_empty() {
+                fields.remove(0);
+            }
             let wrong = |allowed: &str| {
                 ShapeError::line(path, at, format!("{:?}: {allowed}", shown(&line)))
             };
@@ -130,7 +136,7 @@ impl Rows {
                 let [target] = fields[..] else {
                     return Err(wrong(allowed));
                 };
-                let target: i64 = target.parse().map_err(|_unparsed| wrong(allowed))?;
+                let target = whole_number(target).ok_or_else(|| wrong(allowed))?;
                 found
                     .push_mapped(at, target)
                     .ok_or_else(|| wrong(allowed))?;
@@ -352,7 +358,30 @@ fn parse_pair(fields: &[&str]) -> Option<([u64; 2], Option<f32>)> {
         }
         _ => return None,
     };
-    Some(([source.parse().ok()?, target.parse().ok()?], confidence))
+    let index = |field: &str| u64::try_from(whole_number(field)?).ok();
+    Some(([index(source)?, index(target)?], confidence))
+}
+
+/// A whole number, which programs also write as `12.0` or `1.2e+01`.
+fn whole_number(field: &str) -> Option<i64> {
+    let exact = field.parse().ok();
+    exact.or_else(|| {
+        let number: f64 = field.parse().ok()?;
+        // Beyond 2^53 numbers are not exact, and no shape has so many vertices.
+        (number.fract() == 0.0 && number.abs() < 9e15).then_some(number as i64)
+    })
+}
+
+/// A field without quotes around it.
+fn unquoted(field: &str) -> &str {
+    field.trim_matches(['"', '\'']).trim()
+}
+
+/// Whether fields are the names of columns; one may have none.
+fn are_names(fields: &[&str]) -> bool {
+    let names: Vec<&str> = fields.iter().map(|field| unquoted(field)).collect();
+    let is_name = |name: &&str| name.is_empty() || name.starts_with(char::is_alphabetic);
+    names.iter().all(is_name) && names.iter().any(|name| !name.is_empty())
 }
 
 #[cfg(test)]

@@ -36,6 +36,21 @@ fn names_comments_spaces_and_empty_lines_are_passed_over() {
 }
 
 #[test]
+fn what_pandas_and_numpy_write_is_read() {
+    let pairs = |text: &str| read(text).expect("read").pairs;
+    assert_eq!(
+        pairs(",source,target\n0,5,7\n1,0,199\n"),
+        [[5, 7], [0, 199]]
+    );
+    assert_eq!(pairs("\"source\",\"target\"\n5,7\n"), [[5, 7]]);
+    let of_numpy = "5.000000000000000000e+00 7.0\n0.0e+00 1.99e+02\n";
+    assert_eq!(pairs(of_numpy), [[5, 7], [0, 199]]);
+    assert!(message("5.5 7\n").contains(":1: \"5.5 7\": must be"));
+    // Three names with one missing in the middle are no index.
+    assert!(message("a,,b\n0,5,7\n").contains(":2: \"0,5,7\""));
+}
+
+#[test]
 fn a_confidence_may_follow_and_is_checked() {
     let text = "source_index,target_index,confidence\n0,199,0.75\n1,2,1\n3,4\n5,6,0\n";
     let found = read(text).expect("read");
