@@ -20,6 +20,7 @@ use super::read::{Format, read_any};
 use super::shape::Shape;
 use super::write::{SurfaceFormat, WriteError, write_surface};
 use crate::atomic::write_atomically;
+use crate::geometry::linear::is_finite;
 
 /// The properties of a vertex that hold its position.
 const POSITION: [&str; 3] = ["x", "y", "z"];
@@ -106,7 +107,7 @@ pub(crate) fn rewrite_vertices(
             needed,
         });
     }
-    let infinite = |position: &[f64; 3]| position.iter().any(|coordinate| !coordinate.is_finite());
+    let infinite = |position: &[f64; 3]| !is_finite(position);
     // A point of a cloud that had no place has none now.
     let lost = |(position, before)| infinite(position) && (shape.is_mesh() || !infinite(before));
     if let Some(vertex) = positions.iter().zip(&shape.mesh.vertices).position(lost) {
@@ -136,8 +137,7 @@ pub(crate) fn carried_extension(original: &Path) -> String {
 /// The geometry alone, as PLY.
 fn write_moved(mut shape: Shape, out: &Path) -> Result<(), CarryError> {
     if !shape.is_mesh() {
-        let has_place = |place: &[f64; 3]| place.iter().all(|part| part.is_finite());
-        shape.mesh.vertices.retain(has_place);
+        shape.mesh.vertices.retain(is_finite);
     }
     let keeps_normals = shape.mesh.normals.take().is_some() && shape.is_mesh();
     shape.mesh.normals = keeps_normals.then(|| shape.mesh.vertex_normals());

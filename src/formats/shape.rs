@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::error::{FEWEST_POINTS, ShapeError};
+use crate::geometry::linear::is_finite;
 use crate::geometry::{Mesh, cloud_area};
 
 /// A mesh or a point cloud as its file gives it: in the user's coordinates and vertex order.
@@ -116,8 +117,7 @@ impl Shape {
 
     /// Without points that have no place; a note says how many they were.
     fn with_places(self) -> Self {
-        let is_place = |vertex: &[f64; 3]| vertex.iter().all(|part| part.is_finite());
-        let keep: Vec<bool> = self.mesh.vertices.iter().map(is_place).collect();
+        let keep: Vec<bool> = self.mesh.vertices.iter().map(is_finite).collect();
         let lost = keep.iter().filter(|keep| !**keep).count();
         if lost == 0 {
             return self;
@@ -164,7 +164,7 @@ impl Shape {
     }
 
     fn made_sure(self) -> Result<Self, ShapeError> {
-        let infinite = |vertex: &[f64; 3]| vertex.iter().any(|coordinate| !coordinate.is_finite());
+        let infinite = |vertex: &[f64; 3]| !is_finite(vertex);
         let vertices = &self.mesh.vertices;
         if let Some(vertex) = vertices.iter().position(infinite) {
             let value = vertices[vertex];

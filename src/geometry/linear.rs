@@ -83,6 +83,23 @@ pub(crate) fn length(v: [f64; 3]) -> f64 {
     dot(v, v).sqrt()
 }
 
+/// Whether all parts are numbers: neither NaN nor infinite.
+pub(crate) fn is_finite(x: &[f64; 3]) -> bool {
+    x.iter().all(|part| part.is_finite())
+}
+
+/// Two unit vectors at right angles to a unit normal and to each other; the second lies to the left of the first, seen
+/// from where the normal points.
+pub(crate) fn tangents(normal: [f32; 3]) -> [[f32; 3]; 2] {
+    // An axis that is not along it.
+    let axis = match normal[0].abs() < 0.8 {
+        true => [1.0, 0.0, 0.0],
+        false => [0.0, 1.0, 0.0],
+    };
+    let across = unit(cross(normal, axis));
+    [across, cross(normal, across)]
+}
+
 /// The vector scaled to unit length, or zero where it has no direction.
 pub(crate) fn unit<T: Scalar>(v: [T; 3]) -> [f32; 3] {
     let v = v.map(T::into);

@@ -5,6 +5,7 @@
 //! | `linear.rs` | vectors and 3 x 3 matrices as arrays, the mean of points, eigenvectors |
 //! | `mesh.rs` | [`Mesh`], the only triangle mesh of the program: area, volume, normals, topology |
 //! | `edges.rs` | how the triangles of a mesh share their edges |
+//! | `extent.rs` | boxes round points |
 //! | `connected.rs` | which vertices of a mesh are connected |
 //! | `components.rs` | the connected pieces of a mesh, without the small ones if desired |
 //! | `orient.rs` | triangles of a mesh turned outwards, each piece by itself |
@@ -22,6 +23,7 @@ mod components;
 pub(crate) mod connected;
 pub(crate) mod density;
 mod edges;
+mod extent;
 pub(crate) mod linear;
 mod mesh;
 mod neighbours;
@@ -32,9 +34,11 @@ pub(crate) mod testing;
 mod triangles;
 pub(crate) mod winding;
 
+pub(crate) use components::Component;
 pub(crate) use density::cloud_area;
 pub(crate) use edges::EdgeSharing;
 pub(crate) use edges::weld;
+pub(crate) use extent::Extent;
 pub(crate) use isomorph_training::data::Bounds;
 pub use linear::Scalar;
 pub use mesh::Mesh;

@@ -9,8 +9,9 @@ use std::f64::consts::PI;
 use rustc_hash::FxHashMap;
 
 use super::edges::weld;
-use super::linear::{cross, difference, dot, length};
+use super::linear::{cross, difference, dot};
 use super::mesh::Mesh;
+use super::triangles::solid_angle;
 
 /// What was turned.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -196,19 +197,11 @@ fn inside_of(mesh: &Mesh<f64>, closed: &[&Piece], k: usize) -> usize {
     let others = closed.iter().enumerate().filter(|(other, _)| *other != k);
     let around = |piece: &Piece| {
         let angles = piece.triangles.iter();
-        let sum: f64 = angles.map(|&t| solid_angle(corners(mesh, t), place)).sum();
+        let sum: f64 = angles.map(|&t| solid_angle(&corners(mesh, t), place)).sum();
         // A whole sphere, in either winding.
         sum.abs() > 2.0 * PI
     };
     others.filter(|(_, piece)| around(piece)).count()
-}
-
-/// The signed solid angle of a triangle about a place (van Oosterom and Strackee, 1983).
-fn solid_angle(corners: [[f64; 3]; 3], place: [f64; 3]) -> f64 {
-    let [a, b, c] = corners.map(|corner| difference(corner, place));
-    let [la, lb, lc] = [a, b, c].map(length);
-    let over = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb;
-    2.0 * dot(a, cross(b, c)).atan2(over)
 }
 
 #[cfg(test)]

@@ -209,8 +209,8 @@ impl TriangleSearch {
 
 /// The solid angle under which a triangle is seen, positive from its inner side (Van Oosterom and Strackee,
 /// 1983).
-fn solid_angle(corners: &[[f32; 3]; 3], x: [f32; 3]) -> f64 {
-    let [a, b, c] = corners.map(|corner| difference(corner, x).map(f64::from));
+pub(super) fn solid_angle<T: Scalar>(corners: &[[T; 3]; 3], x: [T; 3]) -> f64 {
+    let [a, b, c] = corners.map(|corner| difference(corner, x).map(T::into));
     let (la, lb, lc) = (length(a), length(b), length(c));
     let volume = dot(a, cross(b, c));
     2.0 * volume.atan2(la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb)

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::density::usual_spacing;
-use crate::geometry::linear::{cross, difference, dot, unit};
+use crate::geometry::linear::{difference, dot, tangents};
 use crate::geometry::{Neighbour, NeighbourSearch};
 
 /// Neighbours that a point is seen among, itself first. Of so many at random, one point in 400 has the sector empty.
@@ -55,13 +55,7 @@ pub(super) fn points_at(points: &[[f32; 3]], normals: &[[f32; 3]]) -> Vec<bool> 
 
 /// The widest sector without neighbours around a point, in the plane of its normal, in radians.
 fn widest_sector(points: &[[f32; 3]], normal: [f32; 3], k: usize, near: &[Neighbour]) -> f32 {
-    let axis = if normal[0].abs() < 0.8 {
-        [1.0, 0.0, 0.0]
-    } else {
-        [0.0, 1.0, 0.0]
-    };
-    let across = unit(cross(normal, axis));
-    let along = cross(normal, across);
+    let [across, along] = tangents(normal);
     let away = near[1..]
         .iter()
         .map(|other| difference(points[other.index as usize], points[k]));
@@ -166,6 +160,13 @@ mod tests {
         points.iter().map(|x| x.map(|part| part as f32)).collect()
     }
 
+    /// Points of a unit sphere below a height, which are their own normals.
+    fn cut_ball() -> Vec<[f32; 3]> {
+        let ball = sphere_cloud(8000, 1.0, 82);
+        let below = ball.into_iter().filter(|p| p[2] < 0.3);
+        narrow(&below.collect::<Vec<_>>())
+    }
+
     #[test]
     fn a_complete_shape_has_no_border_and_a_cut_one_has_it_along_the_cut() {
         let (points, normals): (Vec<[f64; 3]>, Vec<[f64; 3]>) =
@@ -173,11 +174,7 @@ mod tests {
         let border = points_at(&narrow(&points), &narrow(&normals));
         let count = border.iter().filter(|is| **is).count();
         assert!(count < 40, "{count} of 8000");
-        let ball: Vec<[f64; 3]> = sphere_cloud(8000, 1.0, 82)
-            .into_iter()
-            .filter(|p| p[2] < 0.3)
-            .collect();
-        let points = narrow(&ball);
+        let points = cut_ball();
         let border = points_at(&points, &points);
         let high = |from: f32, to: f32| {
             let those = (0..points.len()).filter(|k| (from..to).contains(&points[*k][2]));
@@ -195,11 +192,7 @@ mod tests {
 
     #[test]
     fn a_shape_is_known_where_its_points_are_and_not_beyond_its_border() {
-        let ball: Vec<[f64; 3]> = sphere_cloud(8000, 1.0, 82)
-            .into_iter()
-            .filter(|p| p[2] < 0.3)
-            .collect();
-        let points = narrow(&ball);
+        let points = cut_ball();
         let border = points_at(&points, &points);
         let known = Known::of(&points, &border).expect("a border");
         assert!(known.is_whole());

@@ -202,12 +202,18 @@ pub(crate) fn prepare(shapes: &[Shape], options: &DataOptions) -> Result<Keyfram
         .iter()
         .map(|shape| wound_outwards(shape, options.normals, &mut notes))
         .collect();
-    let normalisation = Normalisation::joint(&shapes.iter().map(Cow::as_ref).collect::<Vec<_>>())?;
+    // Once: that of a cloud takes the neighbours of all points.
+    let areas: Vec<f64> = shapes
+        .iter()
+        .map(|shape| shape.area())
+        .collect::<Result<_, _>>()?;
+    let all: Vec<&Shape> = shapes.iter().map(Cow::as_ref).collect();
+    let normalisation = Normalisation::of_areas(&all, &areas);
     let mut between: Vec<Vec<PointPair>> = Vec::with_capacity(options.between.len());
     let mut confidence = Vec::with_capacity(options.between.len());
-    for two in shapes.windows(2) {
-        let two = [two[0].as_ref(), two[1].as_ref()];
-        notes.extend(mismatch::sizes(two)?);
+    for (two, areas) in all.windows(2).zip(areas.windows(2)) {
+        let two = [two[0], two[1]];
+        notes.extend(mismatch::sizes(two, [areas[0], areas[1]]));
         notes.extend(mismatch::distance(two));
     }
     for (k, source) in options.between.iter().enumerate() {
@@ -227,29 +233,8 @@ pub(crate) fn prepare(shapes: &[Shape], options: &DataOptions) -> Result<Keyfram
         confidence.push(known.confidence);
     }
     let mut keys = Vec::with_capacity(shapes.len());
-    for (k, (shape, &time)) in shapes.iter().zip(&options.times).enumerate() {
-        let mut rng = Draw::Points(k).generator(options.seed);
-        notes.extend(shape.notes.iter().cloned());
-        notes.extend(mismatch::sheet(shape));
-        let (points, normals) =
-            points_of(shape, options.points, options.normals, &mut rng, &mut notes)?;
-        let points = points.into_iter().map(|point| normalisation.apply(point));
-        let cloud = PointCloud {
-            points: points.collect(),
-            normals,
-        };
-        let mesh =
-            closed(shape, options.normals).map(|mesh| mesh.moved(|x| normalisation.apply(x)));
-        let border = match (&mesh, &cloud.normals) {
-            (None, Some(normals)) => border::points_at(&cloud.points, normals),
-            _ => Vec::new(),
-        };
-        keys.push(Keyframe {
-            time,
-            cloud,
-            mesh,
-            border,
-        });
+    for (k, shape) in shapes.iter().enumerate() {
+        keys.push(key_frame(k, shape, options, &normalisation, &mut notes)?);
     }
     for (k, pairs) in between.iter().enumerate() {
         let clouds = [&keys[k].cloud, &keys[k + 1].cloud];
@@ -269,6 +254,36 @@ pub(crate) fn prepare(shapes: &[Shape], options: &DataOptions) -> Result<Keyfram
         confidence,
         normalisation,
         notes,
+    })
+}
+
+/// The key frame of this number: its points with their normals, and what is known of the shape beside.
+fn key_frame(
+    k: usize,
+    shape: &Shape,
+    options: &DataOptions,
+    normalisation: &Normalisation,
+    notes: &mut Vec<String>,
+) -> Result<Keyframe, ShapeError> {
+    let mut rng = Draw::Points(k).generator(options.seed);
+    notes.extend(shape.notes.iter().cloned());
+    notes.extend(mismatch::sheet(shape));
+    let (points, normals) = points_of(shape, options.points, options.normals, &mut rng, notes)?;
+    let points = points.into_iter().map(|point| normalisation.apply(point));
+    let cloud = PointCloud {
+        points: points.collect(),
+        normals,
+    };
+    let mesh = closed(shape, options.normals).map(|mesh| mesh.moved(|x| normalisation.apply(x)));
+    let border = match (&mesh, &cloud.normals) {
+        (None, Some(normals)) => border::points_at(&cloud.points, normals),
+        _ => Vec::new(),
+    };
+    Ok(Keyframe {
+        time: options.times[k],
+        cloud,
+        mesh,
+        border,
     })
 }
 

@@ -5,11 +5,11 @@ use std::num::NonZeroUsize;
 use isomorph_training::data::PointPair;
 
 use super::keyframes::PointCloud;
-use crate::formats::{Shape, ShapeError};
+use crate::formats::Shape;
 use crate::geometry::linear::{
-    add, add_outer, cross, difference, dot, mean, symmetric_eigen, unit,
+    add, add_outer, cross, difference, dot, mean, symmetric_eigen, tangents,
 };
-use crate::geometry::{EdgeSharing, Mesh, NeighbourSearch};
+use crate::geometry::{EdgeSharing, Extent, Mesh, NeighbourSearch};
 
 /// Shapes whose lengths differ by more than this are said to.
 const SIZES: f64 = 3.5;
@@ -26,15 +26,12 @@ const MIRRORED: f64 = 0.5;
 /// Fewer pairs say too little.
 const FEWEST_PAIRS: usize = 8;
 
-/// What is said of two shapes that differ much in size.
-///
-/// # Errors
-/// [`ShapeError::Area`].
-pub(super) fn sizes([source, target]: [&Shape; 2]) -> Result<Option<String>, ShapeError> {
-    let ratio = (target.area()? / source.area()?).sqrt();
+/// What is said of two shapes of these areas that differ much in size.
+pub(super) fn sizes([source, target]: [&Shape; 2], areas: [f64; 2]) -> Option<String> {
+    let ratio = (areas[1] / areas[0]).sqrt();
     let factor = ratio.max(ratio.recip());
     if factor < SIZES {
-        return Ok(None);
+        return None;
     }
     let name = target.path.display();
     let which = if ratio > 1.0 { "larger" } else { "smaller" };
@@ -47,10 +44,10 @@ pub(super) fn sizes([source, target]: [&Shape; 2]) -> Result<Option<String>, Sha
         ),
         None => "if this is not meant, scale a file".to_owned(),
     };
-    Ok(Some(format!(
+    Some(format!(
         "{name} is {factor:.1} times {which} in length than {}: {why}",
         source.path.display()
-    )))
+    ))
 }
 
 /// Whether a reflection lays the sources of pairs onto their targets and no rotation does.
@@ -118,7 +115,8 @@ pub(super) fn are_turned_over(pairs: &[PointPair], clouds: [&PointCloud; 2]) -> 
         let normal = |side: usize, normals: &[[f32; 3]], x| {
             normals[search[side].nearest_one(x).index as usize]
         };
-        let [e, f] = [normal(0, source, from[k]), normal(1, target, to)].map(tangents);
+        let [e, f] = [normal(0, source, from[k]), normal(1, target, to)]
+            .map(|normal| tangents(normal).map(wide));
         let flat = |[u, v]: [[f64; 3]; 2], x: [f64; 3]| [dot(u, x), dot(v, x)];
         // Least squares of the map of the plane: M sum(x x^T) = sum(y x^T).
         let (mut square, mut mapped) = ([[0.0; 2]; 2], [[0.0; 2]; 2]);
@@ -141,18 +139,6 @@ pub(super) fn are_turned_over(pairs: &[PointPair], clouds: [&PointCloud; 2]) -> 
     let sides: Vec<bool> = (0..pairs.len()).step_by(step).filter_map(side).collect();
     let over = sides.iter().filter(|over| **over).count();
     sides.len() > NEIGHBOURS && over as f64 > TURNED_OVER * sides.len() as f64
-}
-
-/// Two directions at right angles to a normal and to each other, so that the second lies to the left of the first seen
-/// from outside.
-fn tangents(normal: [f32; 3]) -> [[f64; 3]; 2] {
-    let normal = normal.map(f64::from);
-    let axis = match normal[0].abs() < 0.8 {
-        true => [1.0, 0.0, 0.0],
-        false => [0.0, 1.0, 0.0],
-    };
-    let across = unit(cross(normal, axis)).map(f64::from);
-    [across, cross(normal, across)]
 }
 
 /// The sum of the area vectors of a mesh is nothing if it is closed, half of the area for half a sphere, and more for a
@@ -182,18 +168,9 @@ pub(super) fn sheet(shape: &Shape) -> Option<String> {
 
 /// The bounding boxes of shapes that are far apart, in words.
 pub(super) fn distance([source, target]: [&Shape; 2]) -> Option<String> {
-    let ([low, high], [other_low, other_high]) = (extent(&source.mesh), extent(&target.mesh));
-    let diagonal = |low: [f64; 3], high: [f64; 3]| {
-        let sides = difference(high, low);
-        dot(sides, sides).sqrt()
-    };
-    let largest = diagonal(low, high).max(diagonal(other_low, other_high));
-    let gap = [0, 1, 2].map(|k| {
-        (other_low[k] - high[k])
-            .max(low[k] - other_high[k])
-            .max(0.0)
-    });
-    let gap = dot(gap, gap).sqrt();
+    let (one, other) = (extent(&source.mesh), extent(&target.mesh));
+    let largest = one.diagonal().max(other.diagonal());
+    let gap = one.gap(&other);
     (gap > largest).then(|| {
         format!(
             "{} and {} are {:.1} times their size apart: the motion goes all the way; if it is not meant, move a file",
@@ -204,22 +181,15 @@ pub(super) fn distance([source, target]: [&Shape; 2]) -> Option<String> {
     })
 }
 
-/// The lowest and the highest coordinates of what belongs to the surface.
-fn extent(mesh: &Mesh<f64>) -> [[f64; 3]; 2] {
-    let mut found = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
-    let mut include = |place: &[f64; 3]| {
-        for axis in 0..3 {
-            found[0][axis] = found[0][axis].min(place[axis]);
-            found[1][axis] = found[1][axis].max(place[axis]);
+/// The box of what belongs to the surface.
+fn extent(mesh: &Mesh<f64>) -> Extent {
+    match mesh.triangles.is_empty() {
+        true => Extent::of(mesh.vertices.iter().copied()),
+        false => {
+            let used = mesh.triangles.iter().flatten();
+            Extent::of(used.map(|vertex| mesh.vertices[*vertex as usize]))
         }
-    };
-    if mesh.triangles.is_empty() {
-        mesh.vertices.iter().for_each(&mut include);
-    } else {
-        let used = mesh.triangles.iter().flatten();
-        used.for_each(|vertex| include(&mesh.vertices[*vertex as usize]));
     }
-    found
 }
 
 #[cfg(test)]
@@ -237,7 +207,11 @@ mod tests {
     #[test]
     fn sizes_near_a_ratio_of_units_are_said_with_the_factor() {
         let source = shape("a.ply", 1.0, 0.0);
-        let said = |scale| sizes([&source, &shape("b.ply", scale, 0.0)]).expect("areas");
+        let said = |scale| {
+            let target = shape("b.ply", scale, 0.0);
+            let areas = [&source, &target].map(|shape| shape.area().expect("an area"));
+            sizes([&source, &target], areas)
+        };
         assert_eq!(said(3.0), None);
         assert_eq!(said(0.3), None);
         let metres = said(0.001).expect("said");

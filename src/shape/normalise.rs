@@ -30,12 +30,21 @@ impl Normalisation {
     /// # Panics
     /// If there are no shapes.
     pub fn joint(shapes: &[&Shape]) -> Result<Self, ShapeError> {
+        let areas: Result<Vec<f64>, ShapeError> = shapes.iter().map(|shape| shape.area()).collect();
+        Ok(Self::of_areas(shapes, &areas?))
+    }
+
+    /// The same where the area of each shape is known.
+    ///
+    /// # Panics
+    /// If there are no shapes.
+    pub(crate) fn of_areas(shapes: &[&Shape], areas: &[f64]) -> Self {
         assert!(!shapes.is_empty(), "a joint frame of no shapes");
         let mut low = [f64::INFINITY; 3];
         let mut high = [f64::NEG_INFINITY; 3];
         let mut area = 0.0;
-        for shape in shapes {
-            area += shape.area()? / shapes.len() as f64;
+        for (shape, own) in shapes.iter().zip(areas) {
+            area += own / shapes.len() as f64;
             let mut include = |vertex: &[f64; 3]| {
                 for axis in 0..3 {
                     low[axis] = low[axis].min(vertex[axis]);
@@ -50,10 +59,10 @@ impl Normalisation {
             }
         }
         let centre = [0, 1, 2].map(|axis| low[axis] + (high[axis] - low[axis]) / 2.0);
-        Ok(Self {
+        Self {
             centre,
             scale: area.sqrt().recip(),
-        })
+        }
     }
 
     /// From the user's coordinates to normalised ones.

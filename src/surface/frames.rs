@@ -21,6 +21,7 @@ use crate::formats::{
     self, Shape, SurfaceFormat, carried_extension, rewrite_vertices, write_surface_with,
 };
 use crate::geometry::Mesh;
+use crate::geometry::linear::is_finite;
 use crate::gltf::{Precision, Still};
 
 /// The files that surfaces, and carried vertices, are written to.
@@ -293,7 +294,7 @@ pub(crate) fn carried_vertices(
 ) -> Result<Vec<Vec<[f64; 3]>>, FramesError> {
     let vertices = &shape.mesh.vertices;
     // What has no place stays without: it is not moved.
-    let place = |x: &[f64; 3]| match x.iter().all(|part| part.is_finite()) {
+    let place = |x: &[f64; 3]| match is_finite(x) {
         true => learned.normalisation.apply(*x),
         false => [0.0; 3],
     };

@@ -2,7 +2,7 @@
 
 use super::{AROUND, FAR_OF_MOST, NEIGHBOUR, Step, count, distance};
 use crate::formats::Shape;
-use crate::geometry::{NeighbourSearch, parts_apart};
+use crate::geometry::{Component, Extent, NeighbourSearch, parts_apart};
 
 /// Parts are apart where no two of their points are nearer than so many times the usual distance of neighbours.
 const APART: f64 = 10.0;
@@ -48,18 +48,14 @@ pub(super) fn without_far_pieces(mut shape: Shape, share: f64) -> Shape {
     if pieces.len() < 2 {
         return shape;
     }
-    let boxes: Vec<Extent> = pieces
-        .iter()
-        .map(|piece| {
-            let mut extent = Extent::NONE;
-            for &triangle in &piece.triangles {
-                for vertex in shape.mesh.triangles[triangle] {
-                    extent.include(shape.mesh.vertices[vertex as usize]);
-                }
-            }
-            extent
-        })
-        .collect();
+    let extent = |piece: &Component| {
+        let corners = piece
+            .triangles
+            .iter()
+            .flat_map(|t| shape.mesh.triangles[*t]);
+        Extent::of(corners.map(|vertex| shape.mesh.vertices[vertex as usize]))
+    };
+    let boxes: Vec<Extent> = pieces.iter().map(extent).collect();
     let area: f64 = pieces.iter().map(|piece| piece.area).sum();
     // The largest comes first.
     let far = |k: &usize| {
@@ -80,41 +76,4 @@ pub(super) fn without_far_pieces(mut shape: Shape, share: f64) -> Shape {
         "{name}: left out: {count} small pieces far from the rest; data.clean = \"none\" keeps them"
     ));
     shape
-}
-
-/// A box with its sides along the axes.
-#[derive(Clone, Copy)]
-struct Extent {
-    low: [f64; 3],
-    high: [f64; 3],
-}
-
-impl Extent {
-    const NONE: Self = Self {
-        low: [f64::INFINITY; 3],
-        high: [f64::NEG_INFINITY; 3],
-    };
-
-    fn include(&mut self, point: [f64; 3]) {
-        self.low = [0, 1, 2].map(|axis| self.low[axis].min(point[axis]));
-        self.high = [0, 1, 2].map(|axis| self.high[axis].max(point[axis]));
-    }
-
-    fn diagonal(&self) -> f64 {
-        let sides = [0, 1, 2].map(|axis| self.high[axis] - self.low[axis]);
-        sides.iter().map(|side| side * side).sum::<f64>().sqrt()
-    }
-
-    /// How far the boxes are apart; 0 where they meet.
-    fn gap(&self, other: &Self) -> f64 {
-        let along = |axis: usize| {
-            let (below, above) = (
-                other.low[axis] - self.high[axis],
-                self.low[axis] - other.high[axis],
-            );
-            below.max(above).max(0.0)
-        };
-        let gaps = [0, 1, 2].map(along);
-        gaps.iter().map(|gap| gap * gap).sum::<f64>().sqrt()
-    }
 }
