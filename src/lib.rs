@@ -115,10 +115,11 @@ pub mod comparison {
     pub use crate::session::compare::{CompareOptions, compare, known};
 }
 
-/// What a training step and a whole run cost on this machine.
+/// What a training step and a whole run cost on this machine, and whether its GPU computes right numbers.
 pub mod benchmark {
     pub use crate::session::bench::{
         BenchOptions, Measured, PhaseCost, Phases, Size, bench, unused,
     };
     pub use crate::session::bench_run::{BenchRun, Cost, Job, MeasuredRun, StageCost, bench_run};
+    pub use crate::session::self_test::{Checked, SelfTest, self_test};
 }

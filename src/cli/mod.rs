@@ -26,6 +26,7 @@ mod new_run;
 mod normals;
 mod pick;
 mod resume;
+mod self_test;
 mod terminal;
 mod train;
 mod view;
@@ -78,6 +79,7 @@ enum Command {
     Init(init::InitArgs),
     Info(info::InfoArgs),
     Bench(bench::BenchArgs),
+    SelfTest(self_test::SelfTestArgs),
 }
 
 /// Where networks run.
@@ -164,6 +166,8 @@ enum Failure {
     Usage(String),
     /// Standard output cannot be written.
     Output(io::Error),
+    /// This device does not compute what a processor does, which was printed.
+    WrongNumbers(String),
     /// The result contradicts its input, which was said line by line.
     Contradicted,
 }
@@ -197,6 +201,10 @@ impl Failure {
                 ErrorKind::Failure,
                 "the result contradicts the shapes that were given (--strict); all files were written".to_owned(),
             ),
+            Self::WrongNumbers(device) => (
+                ErrorKind::Failure,
+                format!("{device}: computes wrong numbers; update its driver, or choose another with --device"),
+            ),
             Self::Library(error) => (error.kind(), error.to_string()),
         };
         // The events have said so already, and what to do next.
@@ -228,6 +236,7 @@ pub(crate) fn run(cli: Cli) -> ExitCode {
         Command::Init(args) => init::run(args),
         Command::Info(args) => info::run(args),
         Command::Bench(args) => bench::run(args),
+        Command::SelfTest(args) => self_test::run(args),
     };
     match ended {
         Ok(()) => ExitCode::SUCCESS,

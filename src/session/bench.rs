@@ -98,6 +98,8 @@ pub struct BenchOptions {
 pub struct Measured {
     /// The backend's own name.
     pub backend: String,
+    /// The device's own name.
+    pub device: String,
     /// See [`Size::name`].
     pub size: String,
     /// How derivatives by the input are taken.
@@ -154,6 +156,7 @@ pub fn bench(options: &BenchOptions) -> Result<Measured> {
     };
     Ok(Measured {
         backend: engine.backend(),
+        device: engine.device(),
         size: options.size.name().to_owned(),
         derivatives: options.derivatives,
         threads: rayon::current_num_threads(),

@@ -20,6 +20,7 @@ use crate::data::{Bounds, TrainingData};
 use crate::deformation::{Deformation, OnHost};
 use crate::method::{self, Method};
 use crate::posed::{Slopes, mean_of};
+use crate::probe::{self, Reading};
 use crate::recipe::Recipe;
 use crate::records::{RecordError, Records};
 use crate::report::{Phase, Rates, TermReport};
@@ -66,6 +67,12 @@ pub trait Engine: Send + Sync {
     /// # Errors
     /// [`NotHere`] if it is not compiled for this backend.
     fn method(&self, recipe: &Recipe, bounds: &Bounds) -> Result<Box<dyn Trainer>, NotHere>;
+
+    /// Whether it computes on the processor itself, in the host's memory.
+    fn is_processor(&self) -> bool;
+
+    /// What the networks of a recipe and their layers give here ([`crate::probe`]).
+    fn readings(&self, recipe: &Recipe) -> Vec<Reading>;
 
     /// GFLOP per second of a product of `4000 x 512` by `512 x 512`, the median of seven.
     fn product_rate(&self) -> f64;
@@ -147,6 +154,8 @@ impl MethodSet for AllMethods {
 /// A backend `B` on a device, with the methods of `M`.
 pub struct On<B: TrainBackend, M> {
     device: B::Device,
+    /// The device's own name, where it has one.
+    name: Option<String>,
     methods: PhantomData<M>,
 }
 
@@ -155,7 +164,17 @@ impl<B: TrainBackend, M: MethodSet> On<B, M> {
     pub fn new(device: B::Device) -> Self {
         Self {
             device,
+            name: None,
             methods: PhantomData,
+        }
+    }
+
+    /// The same with the device's own name.
+    #[must_use]
+    pub fn named(self, name: String) -> Self {
+        Self {
+            name: Some(name),
+            ..self
         }
     }
 
@@ -164,27 +183,35 @@ impl<B: TrainBackend, M: MethodSet> On<B, M> {
     /// # Errors
     /// [`DeviceError::None`] with the first line that the driver gave.
     pub fn opens(&self) -> Result<(), DeviceError> {
-        // The first panic, on whichever thread, says why; those that follow only pass it on.
-        let first = Arc::new(Mutex::new(None));
-        let seen = Arc::clone(&first);
-        let hook = std::panic::take_hook();
-        std::panic::set_hook(Box::new(move |panic| {
-            let text = panic
-                .payload_as_str()
-                .unwrap_or("the driver gave no reason");
-            if let Ok(mut first) = seen.lock() {
-                first.get_or_insert_with(|| text.lines().next().unwrap_or_default().to_owned());
-            }
-        }));
-        let opened = catch_unwind(AssertUnwindSafe(|| {
+        caught(|| {
             Tensor::<B::InnerBackend, 1>::ones([1], &self.device).into_data();
-        }));
-        std::panic::set_hook(hook);
-        opened.map_err(|_panic| {
-            let problem = first.lock().ok().and_then(|mut first| first.take());
-            DeviceError::None(problem.unwrap_or_default())
         })
     }
+}
+
+/// What `open` gives; burn-wgpu panics where a driver is missing.
+///
+/// # Errors
+/// [`DeviceError::None`] with the first line that the driver gave.
+pub fn caught<T>(open: impl FnOnce() -> T) -> Result<T, DeviceError> {
+    // The first panic, on whichever thread, says why; those that follow only pass it on.
+    let first = Arc::new(Mutex::new(None));
+    let seen = Arc::clone(&first);
+    let hook = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        let text = panic
+            .payload_as_str()
+            .unwrap_or("the driver gave no reason");
+        if let Ok(mut first) = seen.lock() {
+            first.get_or_insert_with(|| text.lines().next().unwrap_or_default().to_owned());
+        }
+    }));
+    let opened = catch_unwind(AssertUnwindSafe(open));
+    std::panic::set_hook(hook);
+    opened.map_err(|_panic| {
+        let problem = first.lock().ok().and_then(|mut first| first.take());
+        DeviceError::None(problem.unwrap_or_default())
+    })
 }
 
 impl<B: TrainBackend, M: MethodSet> Engine for On<B, M> {
@@ -193,7 +220,16 @@ impl<B: TrainBackend, M: MethodSet> Engine for On<B, M> {
     }
 
     fn device(&self) -> String {
-        format!("{:?}", self.device)
+        let name = self.name.clone();
+        name.unwrap_or_else(|| format!("{:?}", self.device))
+    }
+
+    fn is_processor(&self) -> bool {
+        B::POINTS_AT_A_TIME.is_some()
+    }
+
+    fn readings(&self, recipe: &Recipe) -> Vec<Reading> {
+        probe::readings::<B>(recipe, &self.device)
     }
 
     fn method(&self, recipe: &Recipe, bounds: &Bounds) -> Result<Box<dyn Trainer>, NotHere> {

@@ -22,6 +22,7 @@
 //! | `weights.rs` | networks as plain arrays, for other programs |
 //! | `records.rs` | networks and optimiser states as bytes |
 //! | `engine.rs` | the border to training: a backend without its type |
+//! | `probe.rs` | the operations of a run in small, to compare a device with another |
 //! | `deformation.rs` | the border to what was trained: values and motion of points on the host |
 //! | `report.rs` | phases and terms, as they are reported |
 //! | `flop.rs` | what a step costs |
@@ -44,6 +45,7 @@ mod motion;
 mod network_step;
 mod optimiser;
 mod posed;
+pub mod probe;
 pub mod recipe;
 pub mod records;
 pub mod report;
