@@ -79,6 +79,11 @@ pub(crate) fn damage() -> impl Strategy<Value = Vec<Damage>> {
     prop::collection::vec(one, 1..4)
 }
 
+/// How often each reader is tried: `PROPTEST_CASES`, and a thousand times at least.
+fn cases() -> u32 {
+    ProptestConfig::default().cases.max(1000)
+}
+
 /// Writes a file of this name and reads it.
 pub(crate) fn written<T>(name: &str, bytes: &[u8], read: impl Fn(&Path) -> T) -> T {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -130,7 +135,7 @@ fn check(result: Result<Shape, ShapeError>, length: usize) -> Result<(), TestCas
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 1000, failure_persistence: None, ..Default::default() })]
+    #![proptest_config(ProptestConfig { cases: cases(), failure_persistence: None, ..Default::default() })]
 
     #[test]
     fn a_damaged_ply_is_read_or_refused(which in 0..3usize, damage in damage()) {
