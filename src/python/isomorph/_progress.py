@@ -1,0 +1,62 @@
+"""Progress: a bar of tqdm where that is installed, and the events for whoever listens."""
+
+from __future__ import annotations
+
+import json
+import sys
+from contextlib import contextmanager
+from typing import Callable, Iterator
+
+
+@contextmanager
+def listener(on_event: Callable[[dict], object] | None, progress: bool | None) -> Iterator[Callable[[str], None] | None]:
+    """What the native part calls with each event, as JSON. progress: None shows a bar where tqdm is installed and
+    somebody looks."""
+    bar = None
+    if progress or (progress is None and on_event is None and watched()):
+        try:
+            from tqdm.auto import tqdm
+        except ImportError:
+            if progress:
+                raise
+        else:
+            bar = tqdm(unit="step", leave=False)
+    if bar is None and on_event is None:
+        # Without a listener nothing is encoded; Ctrl-C is seen all the same.
+        yield None
+        return
+
+    def heard(text: str) -> None:
+        event = json.loads(text)
+        if on_event is not None:
+            on_event(event)
+        if bar is not None:
+            follow(bar, event)
+
+    try:
+        yield heard
+    finally:
+        if bar is not None:
+            bar.close()
+
+
+def follow(bar, event: dict) -> None:
+    """Moves the bar."""
+    kind = event["event"]
+    if kind == "started":
+        bar.reset(event["steps"])
+        bar.update(event["first_step"])
+    elif kind == "tick":
+        bar.update(event["step"] - bar.n)
+    elif kind == "step" and event.get("total") is not None:
+        bar.set_postfix(objective=f"{event['total']:.3g}")
+    elif kind == "extracting":
+        bar.reset(event["frames"])
+        bar.set_description("surfaces")
+    elif kind == "extracted":
+        bar.update(1)
+
+
+def watched() -> bool:
+    """Whether somebody looks: a terminal, or a notebook."""
+    return sys.stderr.isatty() or "ipykernel" in sys.modules

@@ -1,0 +1,153 @@
+"""A run that was trained, opened."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import tempfile
+import webbrowser
+from pathlib import Path
+from typing import Any, Callable
+
+import numpy as np
+
+from . import _native
+from ._progress import listener
+from ._shape import rows
+
+
+class Surface(tuple):
+    """Vertices `(n, 3)` and faces `(m, 3)`, to be unpacked; unit normals `(n, 3)` beside them."""
+
+    normals: np.ndarray
+
+    def __new__(cls, vertices: np.ndarray, faces: np.ndarray, normals: np.ndarray) -> Surface:
+        made = super().__new__(cls, (vertices, faces))
+        made.normals = normals
+        return made
+
+    @property
+    def vertices(self) -> np.ndarray:
+        return self[0]
+
+    @property
+    def faces(self) -> np.ndarray:
+        return self[1]
+
+    def __getnewargs__(self):
+        return (*self, self.normals)
+
+    def __repr__(self) -> str:
+        return f"<isomorph surface of {len(self[0])} vertices and {len(self[1])} faces>"
+
+
+class Run:
+    """The motion between two shapes. Times are 0 (the source) to 1 (the target), coordinates those of the shapes.
+
+    Several threads may use one run. A copy, and what is unpickled, opens the folder again.
+    """
+
+    def __init__(self, native: _native.Run, notes: list[str] | None = None):
+        self._native = native
+        #: What was assumed, decided and doubted on the way, one sentence each.
+        self.notes = notes or []
+
+    @property
+    def path(self) -> Path:
+        """The folder of the run."""
+        return Path(self._native.path())
+
+    @property
+    def recipe(self) -> str:
+        """The recipe, every key with its value, as TOML."""
+        return self._native.recipe()
+
+    @property
+    def metrics(self) -> list[dict]:
+        """The logged steps: `step`, `seconds`, `total`, `terms` and more."""
+        return [json.loads(line) for line in self._native.metrics()]
+
+    def surface(self, t: float = 0.5, resolution: int = 192) -> Surface:
+        """The surface at a time. resolution: cells of the grid along the longest side of the box, 8 to 2048."""
+        return Surface(*self._native.surface(t, resolution))
+
+    def carry(self, points: Any, start: float = 0.0, end: float = 1.0) -> np.ndarray:
+        """Where points `(n, 3)` that are given at time `start` are at time `end`, `(n, 3)`."""
+        return self._native.carry(rows("points", points, np.float64), start, end)
+
+    def velocity(self, points: Any, t: float = 0.5) -> np.ndarray:
+        """The velocity `(n, 3)` of what is at `points` at time `t`, in units of length per unit of time."""
+        return self._native.velocity(rows("points", points, np.float64), t)
+
+    def distance(self, points: Any, t: float = 0.5) -> tuple[np.ndarray, np.ndarray]:
+        """The signed distance `(n,)` of points from the surface at a time, negative inside, and its gradient `(n, 3)`."""
+        return self._native.distance(rows("points", points, np.float64), t)
+
+    def save_glb(
+        self,
+        path: str | os.PathLike[str],
+        what: str | None = None,
+        frames: int = 25,
+        resolution: int | None = None,
+        compact: bool = False,
+        on_event: Callable[[dict], object] | None = None,
+        progress: bool | None = None,
+    ) -> Path:
+        """Writes an animated glTF. what: "carried", the source's own mesh moving, or "surface", a surface at each of
+        `frames` times; "carried" where the source is a mesh. compact: half of the size, not for every reader.
+        """
+        if what not in (None, "carried", "surface"):
+            raise ValueError(f'what = {what!r}: must be "carried" or "surface"')
+        path = Path(path)
+        if path.suffix.lower() != ".glb":
+            raise ValueError(f"{path}: must end in .glb")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        # Beside its place, so that it is moved there whole.
+        with tempfile.TemporaryDirectory(dir=path.parent, prefix=".isomorph-") as folder:
+            with listener(on_event, progress) as heard:
+                self._native.animate(folder, frames, resolution, compact, heard)
+            made = {name: Path(folder) / f"{name}.glb" for name in ("carried", "surface")}
+            if what == "carried" and not made[what].exists():
+                raise ValueError('what = "carried": the source is a point cloud; take "surface"')
+            chosen = what or ("carried" if made["carried"].exists() else "surface")
+            shutil.move(made[chosen], path)
+        return path
+
+    def page(self) -> Path:
+        """The page that plays the run in a browser, made anew where it is old."""
+        return Path(self._native.page())
+
+    def show(self, height: int = 600) -> Any:
+        """Shows the page: in a notebook within it, else in the browser."""
+        page = self.page()
+        if in_notebook():
+            from html import escape
+
+            from IPython.display import HTML
+
+            text = escape(page.read_text("utf-8"), quote=True)
+            return HTML(f'<iframe srcdoc="{text}" width="100%" height="{int(height)}" frameborder="0"></iframe>')
+        webbrowser.open(page.resolve().as_uri())
+        return None
+
+    def __fspath__(self) -> str:
+        return str(self.path)
+
+    def __reduce__(self):
+        return (open, (str(self.path.resolve()),))
+
+    def __repr__(self) -> str:
+        return f"<isomorph run {self.path}>"
+
+
+def open(run: str | os.PathLike[str]) -> Run:
+    """Opens the newest checkpoint of a run, whoever made it."""
+    return Run(_native.open(os.fspath(run)))
+
+
+def in_notebook() -> bool:
+    try:
+        return get_ipython().has_trait("kernel")  # type: ignore[name-defined]
+    except (NameError, AttributeError):
+        return False

@@ -1,0 +1,215 @@
+"""What takes time: training, pairs, normals."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import warnings
+from pathlib import Path
+from typing import Any, Callable, Mapping
+
+import numpy as np
+
+from . import _native
+from ._progress import listener
+from ._run import Run
+from ._shape import Shape, ShapeLike, indices, is_path, name_of, rows
+
+
+class IsomorphWarning(UserWarning):
+    """Something speaks against a result."""
+
+
+def morph(
+    source: ShapeLike,
+    target: ShapeLike,
+    *,
+    preset: str = "instant",
+    pairs: Any = None,
+    run: str | os.PathLike[str] | None = None,
+    overwrite: bool = False,
+    frames: int = 13,
+    settings: Mapping[str, Any] | None = None,
+    on_event: Callable[[dict], object] | None = None,
+    progress: bool | None = None,
+) -> Run:
+    """Computes the motion from one shape to another.
+
+    preset: "instant" (seconds), "quick", "default" (minutes) or "quality". pairs: corresponding points as an array
+    `(n, 2)` of vertex numbers or the path of a file; "same-vertices", "match" (found) or "none"; chosen by the shapes
+    without it. run: the folder [runs/SOURCE-TARGET]. frames: surfaces that are written into it. settings: keys of the
+    recipe, as in `{"training": {"steps": 2000}}` or `{"training.steps": 2000}`.
+    """
+    run = Path(run) if run else Path("runs") / f"{name_of(source, 'source')}-{name_of(target, 'target')}"
+    kept = Kept(run, overwrite)
+    files = [kept.shape(source, "source"), kept.shape(target, "target")]
+    text, assumed, doubts = _native.plan(*files, preset, kept.pairs(pairs), frames, changes(settings))
+    notes = list(assumed)
+    for finding, cure in doubts:
+        notes.append(f"doubtful: {finding}; {cure}")
+        warnings.warn(f"{finding}; {cure}", IsomorphWarning, stacklevel=2)
+    return work(lambda heard: _native.train(text, str(run / "recipe.toml"), [], str(run), overwrite, heard),
+                notes, on_event, progress)
+
+
+def train(
+    recipe: str | os.PathLike[str] | Mapping[str, Any],
+    run: str | os.PathLike[str],
+    *,
+    overwrite: bool = False,
+    settings: Mapping[str, Any] | None = None,
+    on_event: Callable[[dict], object] | None = None,
+    progress: bool | None = None,
+) -> Run:
+    """Trains a recipe into a folder. recipe: the path of a TOML file, TOML itself (with a line end in it), or nested
+    dicts; paths in it are relative to the file, else to the working directory. settings: see `morph`.
+    """
+    if isinstance(recipe, Mapping):
+        text, origin = toml(recipe), Path.cwd() / "recipe.toml"
+    elif isinstance(recipe, str) and "\n" in recipe:
+        text, origin = recipe, Path.cwd() / "recipe.toml"
+    else:
+        origin = Path(recipe)
+        try:
+            text = origin.read_text("utf-8")
+        except (OSError, UnicodeDecodeError) as reason:
+            raise ValueError(f"{origin}: cannot be read ({reason})") from None
+    given = (text, str(origin), changes(settings), os.fspath(run), overwrite)
+    return work(lambda heard: _native.train(*given, heard), [], on_event, progress)
+
+
+def resume(
+    run: str | os.PathLike[str],
+    *,
+    settings: Mapping[str, Any] | None = None,
+    on_event: Callable[[dict], object] | None = None,
+    progress: bool | None = None,
+) -> Run:
+    """Goes on with a run from its newest checkpoint, to the last step of its recipe. settings: see `morph`."""
+    given = (os.fspath(run), changes(settings))
+    return work(lambda heard: _native.resume(*given, heard), [], on_event, progress)
+
+
+def match(
+    source: ShapeLike,
+    target: ShapeLike,
+    *,
+    aligned: bool = False,
+    confidence: float = 0.5,
+    on_event: Callable[[dict], object] | None = None,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Finds pairs of corresponding vertices, `(n, 2)`, and how sure each is, `(n,)` from 0 to 1. aligned: the shapes are
+    in one frame. confidence: the least that a pair must have.
+    """
+    shapes = [Shape.of(source), Shape.of(target)]
+    given = [(shape.vertices, shape.faces) for shape in shapes]
+    with listener(on_event, False) as heard:
+        return _native.match_shapes(*given, aligned, confidence, heard)
+
+
+def estimate_normals(points: Any) -> np.ndarray:
+    """The normals `(n, 3)` of a cloud of points `(n, 3)`, out of the shape."""
+    return _native.estimate_normals(rows("points", points, np.float64))
+
+
+def work(do: Callable, notes: list[str], on_event, progress) -> Run:
+    """Does something, gathers what is noted on the way, and warns of what speaks against the result."""
+    doubtful = []
+
+    def heard(event: dict) -> None:
+        if event["event"] == "note":
+            notes.append(event["text"])
+        elif event["event"] == "doubtful":
+            doubtful.append(f"{event['finding']}; {event['cure']}")
+        if on_event is not None:
+            on_event(event)
+
+    shows = progress if progress is not None or on_event is None else False
+    with listener(heard, shows if shows is not None else wants_bar()) as listens:
+        native = do(listens)
+    for text in doubtful:
+        notes.append(f"doubtful: {text}")
+        warnings.warn(text, IsomorphWarning, stacklevel=3)
+    return Run(native, notes)
+
+
+def wants_bar() -> bool:
+    """Whether a bar is shown without being asked for."""
+    from importlib.util import find_spec
+
+    from ._progress import watched
+
+    return watched() and find_spec("tqdm") is not None
+
+
+class Kept:
+    """The files that a run needs of what is in memory: they lie in a folder beside it, named after it."""
+
+    def __init__(self, run: Path, overwrite: bool):
+        self.folder = run.parent / f"{run.name}.shapes"
+        if self.folder.exists() and not overwrite and run.exists():
+            # The run says so itself, in the words of the command line.
+            return
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    def shape(self, what: ShapeLike, name: str) -> str:
+        if is_path(what):
+            return os.fspath(what)
+        shape = Shape.of(what)
+        path = self.place(f"{name}.ply")
+        shape.save(path)
+        return str(path)
+
+    def pairs(self, pairs: Any) -> str | None:
+        if pairs is None or isinstance(pairs, str):
+            return pairs
+        if is_path(pairs):
+            return os.fspath(pairs)
+        path = self.place("pairs.csv")
+        numbers = indices("pairs", pairs, 1 << 32, columns=2)
+        np.savetxt(path, numbers, fmt="%d", delimiter=",", header="source_index,target_index", comments="")
+        return str(path)
+
+    def place(self, name: str) -> Path:
+        self.folder.mkdir(parents=True, exist_ok=True)
+        return self.folder / name
+
+
+def changes(settings: Mapping[str, Any] | None) -> list[str]:
+    """Keys of the recipe as the command line takes them: `training.steps=2000`."""
+    return [f"{key}={word(value)}" for key, value in flat(settings or {})]
+
+
+def flat(settings: Mapping[str, Any], before: str = ""):
+    for key, value in settings.items():
+        name = before + key.replace("_", "-")
+        if isinstance(value, Mapping):
+            yield from flat(value, f"{name}.")
+        else:
+            yield name, value
+
+
+def word(value: Any) -> str:
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return "[" + ", ".join(quoted(each) for each in value) + "]"
+    return str(value)
+
+
+def toml(recipe: Mapping[str, Any]) -> str:
+    """Nested dicts as TOML with dotted keys."""
+    return "".join(f"{key} = {quoted(value)}\n" for key, value in flat(recipe))
+
+
+def quoted(value: Any) -> str:
+    if isinstance(value, (str, os.PathLike)):
+        text = os.fspath(value).replace("\\", "\\\\").replace('"', '\\"')
+        return f'"{text}"'
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float):
+        return repr(value) if value == value and abs(value) != float("inf") else str(value).replace("-inf", "-inf")
+    return word(value)

@@ -1,0 +1,31 @@
+//! isomorph for Python: the part in Rust. It takes and gives arrays of numpy as they are in memory; what users
+//! call, and all that converts, is in `isomorph/`, in Python.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | `arrays.rs` | points from numpy and to it |
+//! | `failure.rs` | errors as Python's exceptions |
+//! | `watch.rs` | events for a callback, and Ctrl-C |
+//! | `run.rs` | `Run`: what was trained |
+//! | `shapes.rs` | files of shapes, normals, pairs |
+//! | `train.rs` | training: new runs, and those that go on |
+
+mod arrays;
+mod failure;
+mod run;
+mod shapes;
+mod train;
+mod watch;
+
+/// The module `isomorph._native`.
+#[pyo3::pymodule]
+mod _native {
+    #[pymodule_export]
+    use crate::failure::TrainingError;
+    #[pymodule_export]
+    use crate::run::{Run, open};
+    #[pymodule_export]
+    use crate::shapes::{estimate_normals, match_shapes, read_shape, write_shape};
+    #[pymodule_export]
+    use crate::train::{plan, recipe, resume, train};
+}

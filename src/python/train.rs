@@ -1,0 +1,83 @@
+//! Training: new runs, and those that go on.
+
+use std::path::{Path, PathBuf};
+
+use isomorph::morph::{MorphOptions, plan_morph};
+use isomorph::{Backend, Recipe, Session};
+use pyo3::prelude::*;
+
+use crate::failure::raised;
+use crate::run::Run;
+use crate::watch::Watch;
+
+/// A recipe, every key with its value, as TOML. Paths in the text are relative to the folder of `origin`.
+#[pyfunction]
+pub(crate) fn recipe(text: &str, origin: PathBuf, changes: Vec<String>) -> PyResult<String> {
+    let recipe = parsed(text, &origin, &changes)?;
+    Ok(recipe.to_toml())
+}
+
+/// A recipe for two files as TOML, what it takes for granted, and what may be wrong with it.
+#[pyfunction]
+pub(crate) fn plan(
+    py: Python<'_>,
+    source: PathBuf,
+    target: PathBuf,
+    preset: String,
+    pairs: Option<String>,
+    frames: usize,
+    changes: Vec<String>,
+) -> PyResult<(String, Vec<String>, Vec<(String, String)>)> {
+    let options = MorphOptions {
+        pairs,
+        preset,
+        frames,
+        changes,
+    };
+    let plan = py.detach(|| plan_morph(&source, &target, &options));
+    let plan = plan.map_err(raised)?;
+    let doubts = plan.doubts.into_iter().map(|doubt| (doubt.finding, doubt.cure));
+    Ok((plan.recipe.to_toml(), plan.assumed, doubts.collect()))
+}
+
+/// Trains a recipe into a folder.
+#[pyfunction]
+#[pyo3(signature = (text, origin, changes, run, replace, on_event))]
+pub(crate) fn train(
+    py: Python<'_>,
+    text: &str,
+    origin: PathBuf,
+    changes: Vec<String>,
+    run: PathBuf,
+    replace: bool,
+    on_event: Option<Py<PyAny>>,
+) -> PyResult<Run> {
+    let recipe = parsed(text, &origin, &changes)?;
+    let session = py.detach(|| Session::prepare(recipe, &run, Backend::Flex));
+    let session = session.map_err(raised)?;
+    let session = if replace { session.replacing() } else { session };
+    trained(py, session, on_event)
+}
+
+/// Goes on with a run.
+#[pyfunction]
+#[pyo3(signature = (run, changes, on_event))]
+pub(crate) fn resume(
+    py: Python<'_>,
+    run: PathBuf,
+    changes: Vec<String>,
+    on_event: Option<Py<PyAny>>,
+) -> PyResult<Run> {
+    let session = py.detach(|| Session::resume(&run, &changes, Backend::Flex));
+    trained(py, session.map_err(raised)?, on_event)
+}
+
+fn parsed(text: &str, origin: &Path, changes: &[String]) -> PyResult<Recipe> {
+    Recipe::parse(text, origin, changes).map_err(|error| raised(error.into()))
+}
+
+fn trained(py: Python<'_>, mut session: Session, on_event: Option<Py<PyAny>>) -> PyResult<Run> {
+    let mut watch = Watch::new(on_event, session.stop_flag());
+    let ended = py.detach(|| session.train(|event| watch.hear(event)));
+    watch.end(ended).map(Run::new)
+}
