@@ -1,15 +1,31 @@
 //! Whole files or none: every file that isomorph leaves under a final name is first written
 //! beside it under a temporary one, flushed to the disk, and then renamed.
 
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::Path;
+use std::time::Duration;
 
 /// What the names of temporary files begin with.
 const TEMPORARY: &str = ".isomorph-";
 
+/// No file takes as long to be written.
+const OLD: Duration = Duration::from_secs(3600);
+
 /// Whether a file of this name is what a killed [`write_atomically`] left behind.
 pub(crate) fn is_left_over(name: &std::ffi::OsStr) -> bool {
     name.to_string_lossy().starts_with(TEMPORARY)
+}
+
+/// Deletes what killed processes left in a folder, and what is too old to be another's work in progress.
+pub(crate) fn sweep(folder: &Path) {
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let age = entry.metadata().and_then(|found| found.modified());
+        let age = age.ok().and_then(|written| written.elapsed().ok());
+        if is_left_over(&entry.file_name()) && age.is_some_and(|age| age > OLD) {
+            // Only unused space is at stake: not worth stopping for.
+            let _ = std::fs::remove_file(entry.path());
+        }
+    }
 }
 
 /// Writes a file so that `path` holds either what it held before or all of what `write` writes.
@@ -35,7 +51,7 @@ pub(crate) fn write_atomically(
         temporary.as_file().sync_all()?;
         make_readable(temporary.as_file())?;
         temporary.persist(path).map_err(|refused| refused.error)?;
-        Ok(())
+        flush_folder(folder)
     };
     whole().map_err(|error| naming(path, &error))
 }
@@ -56,6 +72,22 @@ pub(crate) fn check_writable(path: &Path) -> io::Result<()> {
         probe.prefix(TEMPORARY).tempfile_in(folder).map(drop)
     };
     tried().map_err(|error| naming(path, &error))
+}
+
+/// Makes the names in a folder as durable as the files, where the file system can.
+///
+/// # Errors
+/// What the file system says, unless it says that it cannot.
+pub(crate) fn flush_folder(path: &Path) -> io::Result<()> {
+    if cfg!(unix) {
+        let flushed = std::fs::File::open(path)?.sync_all();
+        match flushed.as_ref().map_err(io::Error::kind) {
+            Err(ErrorKind::InvalidInput | ErrorKind::Unsupported) => Ok(()),
+            _ => flushed,
+        }
+    } else {
+        Ok(())
+    }
 }
 
 /// The folder that a file lies in.
@@ -106,6 +138,25 @@ mod tests {
             .expect("a folder")
             .count();
         assert_eq!(left, 1, "the temporary file is gone");
+    }
+
+    #[test]
+    fn what_was_left_long_ago_is_deleted_and_nothing_else() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let old = std::time::SystemTime::now() - 2 * OLD;
+        for (name, written) in [
+            (".isomorph-a", Some(old)),
+            (".isomorph-b", None),
+            ("mine", Some(old)),
+        ] {
+            let file = std::fs::File::create(folder.path().join(name)).expect("a file");
+            written
+                .into_iter()
+                .for_each(|at| file.set_modified(at).expect("a time"));
+        }
+        sweep(folder.path());
+        let left = |name: &str| folder.path().join(name).exists();
+        assert!(!left(".isomorph-a") && left(".isomorph-b") && left("mine"));
     }
 
     #[test]

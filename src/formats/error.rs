@@ -102,8 +102,22 @@ pub enum ShapeError {
         /// Where they are.
         place: [f64; 3],
     },
+    /// Points on a line.
+    #[error(
+        "{}: all {vertices} points lie on one line: no surface passes through them; check which columns were exported",
+        .path.display()
+    )]
+    OneLine {
+        /// The file.
+        path: PathBuf,
+        /// How many points it has.
+        vertices: usize,
+    },
     /// There is no surface to speak of, or one too large for float64.
-    #[error("{}: surface area {area}: must be positive and finite", .path.display())]
+    #[error(
+        "{}: surface area {area}: must be positive and finite; check the faces, and whether coordinates are sensible",
+        .path.display()
+    )]
     Area {
         /// The file.
         path: PathBuf,

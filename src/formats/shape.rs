@@ -2,9 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
+use glam::DVec3;
+
 use super::error::{FEWEST_POINTS, ShapeError};
 use crate::geometry::linear::is_finite;
-use crate::geometry::{Mesh, cloud_area};
+use crate::geometry::{Extent, Mesh, cloud_area};
 
 /// A mesh or a point cloud as its file gives it: in the user's coordinates and vertex order.
 #[derive(Debug, Clone, PartialEq)]
@@ -191,9 +193,64 @@ impl Shape {
         }
         if self.is_mesh() {
             self.area()?;
+        } else if on_one_line(vertices) {
+            let vertices = vertices.len();
+            return Err(ShapeError::OneLine {
+                path: self.path,
+                vertices,
+            });
         }
-        Ok(self)
+        Ok(self.with_note_on_precision())
     }
+
+    /// Says where 32-bit coordinates are too coarse for the shape, such as those of a map.
+    fn with_note_on_precision(mut self) -> Self {
+        let numbers = || self.mesh.vertices.iter().flatten().copied();
+        if are_rounded_to_32_bits(numbers()) {
+            let largest = numbers().fold(0.0_f64, |largest, x| largest.max(x.abs()));
+            // Between two numbers of 32 bits that are as large.
+            let step = largest * f64::from(f32::EPSILON);
+            let size = Extent::of(self.mesh.vertices.iter().copied()).diagonal();
+            if step > COARSE * size {
+                self.notes.push(format!(
+                    "{}: coordinates near {largest:.0} in 32 bits are {:.3} apart, {:.2} % of the shape's size, so finer detail is lost; export them relative to a place near the shape, or in 64 bits",
+                    self.path.display(),
+step,
+                    100.0 * step / size
+                ));
+            }
+        }
+        self
+    }
+}
+
+/// The step between coordinates, relative to the shape's size, from which on it is noticed.
+const COARSE: f64 = 1e-4;
+
+/// Whether numbers were rounded to 32 bits: all are numbers of 32 bits, and a tenth has the last of these bits.
+/// Whole numbers, and those of a few decimals, have it not.
+fn are_rounded_to_32_bits(numbers: impl Iterator<Item = f64>) -> bool {
+    let (mut all, mut last) = (0_usize, 0_usize);
+    for x in numbers {
+        let narrow = x as f32;
+        if f64::from(narrow) != x {
+            return false;
+        }
+        all += 1;
+        last += (narrow.to_bits() & 1) as usize;
+    }
+    10 * last > all
+}
+
+/// Whether points are all on one line, but for rounding.
+fn on_one_line(points: &[[f64; 3]]) -> bool {
+    let from = |point: &[f64; 3]| DVec3::from_array(*point) - DVec3::from_array(points[0]);
+    let all = points.iter().map(from);
+    let longest = all.clone().max_by(|a, b| a.length().total_cmp(&b.length()));
+    let longest = longest.unwrap_or_default();
+    let along = longest.normalize_or_zero();
+    all.map(|v| v.reject_from_normalized(along).length())
+        .all(|off| off <= 1e-7 * longest.length())
 }
 
 /// The length of the file, or why it cannot be read; an empty one is refused here.
@@ -244,6 +301,47 @@ mod tests {
     }
 
     #[test]
+    fn points_on_a_line_are_refused_and_those_beside_it_are_not() {
+        let cloud = |off: f64| {
+            let place = |k: i32| {
+                [
+                    1e6 + f64::from(k),
+                    3.0 - 2.0 * f64::from(k),
+                    off * f64::from(k % 3),
+                ]
+            };
+            let mesh = Mesh::new((0..100).map(place).collect(), Vec::new());
+            Shape::of(mesh).checked()
+        };
+        let text = cloud(0.0).expect_err("a line").to_string();
+        assert!(text.contains("all 100 points lie on one line"), "{text}");
+        cloud(0.01).expect("a strip");
+    }
+
+    #[test]
+    fn coordinates_that_32_bits_are_too_coarse_for_are_noticed() {
+        // A ring of radius 1 at a place of a map, as 32 bits and as 64.
+        let ring = |east: f64, narrow: bool| {
+            let place = |k: u32| {
+                let angle = f64::from(k) / 10.0;
+                let point = [east + angle.cos(), angle.sin(), angle.cos() * angle.sin()];
+                point.map(|x| if narrow { f64::from(x as f32) } else { x })
+            };
+            let mesh = Mesh::new((0..64).map(place).collect(), Vec::new());
+            Shape::of(mesh).checked().expect("a shape").notes
+        };
+        let notes = ring(500_000.0, true);
+        assert_eq!(notes.len(), 1, "{notes:?}");
+        assert!(
+            notes[0].contains("coordinates near 500001 in 32 bits"),
+            "{notes:?}"
+        );
+        for (east, narrow) in [(500_000.0, false), (100.0, true)] {
+            assert_eq!(ring(east, narrow), Vec::<String>::new(), "{east}, {narrow}");
+        }
+    }
+
+    #[test]
     fn a_mesh_without_area_is_refused() {
         let vertices = vec![[0.0; 3], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]];
         let path = PathBuf::from("line.obj");
@@ -258,7 +356,8 @@ mod tests {
 
     #[test]
     fn points_without_a_place_are_left_out_and_the_others_keep_their_numbers() {
-        let mut vertices: Vec<[f64; 3]> = (0..100).map(|k| [f64::from(k), 0.0, 0.0]).collect();
+        let place = |k: i32| [f64::from(k), f64::from(k * k % 7), 0.0];
+        let mut vertices: Vec<[f64; 3]> = (0..100).map(place).collect();
         vertices[7][2] = f64::NAN;
         vertices[20][0] = f64::INFINITY;
         let normals = (0..100).map(|k| [k as f32, 0.0, 0.0]).collect();

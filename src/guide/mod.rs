@@ -13,6 +13,8 @@
 //! | [`method`] | the equations, where each lives, and what each part is worth |
 //! | [`design`] | decisions of the program, and what they rest on |
 //! | [`performance`] | how long a step takes on a CPU and on a GPU |
+//! | [`python`] | isomorph from Python: arrays in, arrays out |
+//! | [`robustness`] | what was tried to break isomorph: files, kills, disks, numbers, drivers |
 //! | [`carrying_on`] | for those who change isomorph: the map, worked examples, tests |
 //!
 //! The chapters are the Markdown files of this folder. `links.txt` comes before each of them and turns
@@ -71,6 +73,16 @@ pub mod design {
 pub mod performance {
     #![doc = include_str!("links.txt")]
     #![doc = include_str!("performance.md")]
+}
+
+pub mod python {
+    #![doc = include_str!("links.txt")]
+    #![doc = include_str!("python.md")]
+}
+
+pub mod robustness {
+    #![doc = include_str!("links.txt")]
+    #![doc = include_str!("robustness.md")]
 }
 
 pub mod carrying_on {

@@ -14,11 +14,12 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use isomorph_training::records::{RecordError, Records};
 use serde::{Deserialize, Serialize};
 
+use crate::atomic::flush_folder;
 use crate::recipe::{Recipe, RecipeError};
 use crate::shape::{Bounds, Normalisation};
 
@@ -26,6 +27,9 @@ use crate::shape::{Bounds, Normalisation};
 pub(crate) const FORMAT_VERSION: u32 = 1;
 
 const STATE: &str = "state.json";
+
+/// What the names of folders begin with that are being written or deleted.
+const TEMPORARY: &str = ".step-";
 
 /// What `state.json` holds.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -142,7 +146,14 @@ impl Checkpoint {
         if found > FORMAT_VERSION {
             return Err(CheckpointError::Version { path: file, found });
         }
-        let state = serde_json::from_value(value).map_err(damaged)?;
+        let state: State = serde_json::from_value(value).map_err(damaged)?;
+        // Files of the checkpoint alone: a run may come from anywhere.
+        if let Some(name) = state.files.keys().find(|name| !is_plain(name)) {
+            return Err(CheckpointError::Damaged {
+                path: file,
+                problem: format!("{name:?} is no name of a file beside it"),
+            });
+        }
         Ok(Self {
             path: path.to_path_buf(),
             state,
@@ -225,7 +236,7 @@ pub(crate) fn save(
     let written = || -> io::Result<()> {
         fs::create_dir_all(folder)?;
         let temporary = tempfile::Builder::new()
-            .prefix(".step-")
+            .prefix(TEMPORARY)
             .tempdir_in(folder)?;
         for (name, bytes) in &files {
             write_through(&temporary.path().join(name), bytes)?;
@@ -236,7 +247,7 @@ pub(crate) fn save(
         )?;
         flush_folder(temporary.path())?;
         if path.exists() {
-            fs::remove_dir_all(&path)?;
+            remove(&path, state.step)?;
         }
         fs::rename(temporary.path(), &path)?;
         // Renamed away: there is nothing left to delete.
@@ -247,14 +258,27 @@ pub(crate) fn save(
         path: path.clone(),
         reason,
     })?;
+    prune(folder, keep)?;
+    Ok(path)
+}
+
+/// Deletes all but the `keep` newest.
+fn prune(folder: &Path, keep: usize) -> Result<(), CheckpointError> {
     let all = list(folder);
-    for (_, old) in &all[..all.len().saturating_sub(keep)] {
-        fs::remove_dir_all(old).map_err(|reason| CheckpointError::Io {
+    for (step, old) in &all[..all.len().saturating_sub(keep)] {
+        remove(old, *step).map_err(|reason| CheckpointError::Io {
             path: old.clone(),
             reason,
         })?;
     }
-    Ok(path)
+    Ok(())
+}
+
+/// Deletes a checkpoint, which has lost its name before it has lost its first file.
+pub(crate) fn remove(path: &Path, step: usize) -> io::Result<()> {
+    let hidden = path.with_file_name(format!("{TEMPORARY}{step:06}-old"));
+    fs::rename(path, &hidden)?;
+    fs::remove_dir_all(&hidden)
 }
 
 /// The checkpoints in a folder, oldest first.
@@ -271,14 +295,21 @@ pub(crate) fn list(folder: &Path) -> Vec<(usize, PathBuf)> {
     found
 }
 
-/// Deletes what an interrupted [`save`] left behind.
-pub(crate) fn sweep(folder: &Path) {
+/// Deletes what an interrupted [`save`] left behind: what it was writing, and what it had yet to delete.
+pub(crate) fn sweep(folder: &Path, keep: usize) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
-        if entry.file_name().to_string_lossy().starts_with(".step-") {
+        if entry.file_name().to_string_lossy().starts_with(TEMPORARY) {
             // Only unused space is at stake: not worth stopping for.
             let _ = fs::remove_dir_all(entry.path());
         }
     }
+    let _ = prune(folder, keep);
+}
+
+/// Whether a name is one of a file, and no path to elsewhere.
+fn is_plain(name: &str) -> bool {
+    let mut parts = Path::new(name).components();
+    matches!(parts.next(), Some(Component::Normal(_))) && parts.next().is_none()
 }
 
 /// Writes a file down to the disk; an error names it.
@@ -290,13 +321,4 @@ fn write_through(path: &Path, content: &[u8]) -> io::Result<()> {
     };
     let file = path.file_name().unwrap_or_default().to_string_lossy();
     write().map_err(|error: io::Error| io::Error::new(error.kind(), format!("{file}: {error}")))
-}
-
-/// Makes the names in a folder as durable as the files; not every system can.
-fn flush_folder(path: &Path) -> io::Result<()> {
-    if cfg!(unix) {
-        fs::File::open(path)?.sync_all()
-    } else {
-        Ok(())
-    }
 }

@@ -9,6 +9,7 @@ use super::checkpoint::{Checkpoint, CheckpointError};
 use super::folder::RunFolder;
 use super::learned::{self, Frame};
 use super::learner::{Learner, Outcome};
+use super::lock::RunLock;
 use super::log::RunLog;
 use super::measure::{Ruler, measure};
 use super::prepare::Prepared;
@@ -29,19 +30,25 @@ fn is_of(run: &RunFolder, recipe: &Recipe) -> bool {
         .is_ok_and(|(before, _)| before == *recipe)
 }
 
-/// The run in a folder if it was made with this recipe, with its newest checkpoint; else a new one.
-fn open_or_create(path: &Path, recipe: &Recipe) -> Result<(RunFolder, Option<Checkpoint>)> {
+/// The run in a folder if it was made with this recipe, with its newest checkpoint; else a new one. No other process
+/// trains in it.
+fn open_or_create(
+    path: &Path,
+    recipe: &Recipe,
+) -> Result<(RunFolder, RunLock, Option<Checkpoint>)> {
     if let Ok(run) = RunFolder::open(path)
         && is_of(&run, recipe)
     {
+        let lock = run.lock()?;
         match Checkpoint::newest(&run.checkpoints()) {
-            Ok(checkpoint) => return Ok((run, Some(checkpoint))),
-            Err(CheckpointError::None(_)) => return Ok((run, None)),
+            Ok(checkpoint) => return Ok((run, lock, Some(checkpoint))),
+            Err(CheckpointError::None(_)) => return Ok((run, lock, None)),
             // Damaged: the run starts again.
             Err(_) => {}
         }
     }
-    Ok((RunFolder::create(path, &recipe.to_toml(), true)?, None))
+    let (run, lock) = RunFolder::create(path, &recipe.to_toml(), true)?;
+    Ok((run, lock, None))
 }
 
 /// What came out of one method on one pair.
@@ -65,7 +72,7 @@ pub(super) fn make(
     ruler: &Ruler,
     on_event: &mut dyn FnMut(&Event),
 ) -> Result<Made> {
-    let (run, checkpoint) = open_or_create(path, recipe)?;
+    let (run, _lock, checkpoint) = open_or_create(path, recipe)?;
     let step = checkpoint.as_ref().map(|found| found.state.step);
     let mut log = RunLog::open(run.path(), step)?;
     let keyframes = &prepared.keyframes;

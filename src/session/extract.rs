@@ -106,6 +106,7 @@ impl Trained {
         stop: &StopFlag,
         mut on_event: impl FnMut(&Event),
     ) -> Result<PathBuf> {
+        self.folder().check_output()?;
         let mut log = RunLog::open(self.folder().path(), Some(usize::MAX))?;
         self.extract_into(options, stop, &mut log, &mut on_event)?;
         Ok(self.output(options).join("frames.json"))

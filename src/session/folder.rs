@@ -8,6 +8,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use super::lock::{self, RunLock};
 use crate::atomic;
 use crate::error::Result;
 use crate::recipe::{Recipe, RecipeError};
@@ -26,6 +27,19 @@ pub enum FolderError {
     /// Not a run.
     #[error("{0}: not a run: it has no recipe.toml; name the folder that training made")]
     Missing(PathBuf),
+    /// Another process trains in it.
+    #[error("{path}: in use: {holder} trains this run; wait until it ends, or stop it")]
+    Busy {
+        /// The folder.
+        path: PathBuf,
+        /// Who.
+        holder: String,
+    },
+    /// Something of the run lies elsewhere.
+    #[error(
+        "{0}: is a symbolic link, and nothing is written through one inside a run; put a file or folder in its place"
+    )]
+    Link(PathBuf),
     /// The file system refused.
     #[error("{path}: {reason}")]
     Io {
@@ -50,34 +64,52 @@ impl RunFolder {
     ///
     /// # Errors
     /// [`FolderError`]; with `replace` an older run there is deleted first, and nothing but a run ever is.
-    pub(crate) fn create(
+    pub(super) fn create(
         path: &Path,
         recipe: &str,
         replace: bool,
-    ) -> std::result::Result<Self, FolderError> {
+    ) -> std::result::Result<(Self, RunLock), FolderError> {
         let io = |reason| FolderError::Io {
             path: path.to_path_buf(),
             reason,
         };
-        let occupied = match fs::read_dir(path) {
-            Ok(entries) => holds_anything(entries),
-            Err(error) if error.kind() == io::ErrorKind::NotFound => false,
-            Err(reason) => return Err(io(reason)),
-        };
         let run = Self(path.to_path_buf());
-        if occupied {
-            if !replace {
-                return Err(FolderError::Exists(path.to_path_buf()));
-            }
-            if !run.recipe().is_file() {
-                return Err(FolderError::NotARun(path.to_path_buf()));
-            }
-            run.clear().map_err(io)?;
-        }
+        let refused_as_it_is = || match fs::read_dir(path).map(holds_anything) {
+            Ok(true) if !replace => Err(FolderError::Exists(path.to_path_buf())),
+            Ok(true) if !run.recipe().is_file() => Err(FolderError::NotARun(path.to_path_buf())),
+            Ok(_) => Ok(()),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+            Err(reason) => Err(io(reason)),
+        };
+        // Before the lock, so that what is refused is as it was; and with it, for what came in between.
+        refused_as_it_is()?;
         fs::create_dir_all(path).map_err(io)?;
+        let lock = run.lock()?;
+        refused_as_it_is()?;
+        run.clear().map_err(io)?;
         atomic::write_atomically(&run.recipe(), |out| out.write_all(recipe.as_bytes()))
             .map_err(io)?;
-        Ok(run)
+        Ok((run, lock))
+    }
+
+    /// The right to train in it.
+    ///
+    /// # Errors
+    /// [`FolderError::Busy`], [`FolderError::Link`], [`FolderError::Io`].
+    pub(super) fn lock(&self) -> std::result::Result<RunLock, FolderError> {
+        let files = [lock::FILE, "metrics.jsonl", "run.log"].map(|name| self.0.join(name));
+        let folders = [self.checkpoints(), self.meshes()];
+        files.into_iter().chain(folders).try_for_each(no_link)?;
+        RunLock::take(&self.0)
+    }
+
+    /// Whether its surfaces and its log can be written without leaving it.
+    ///
+    /// # Errors
+    /// [`FolderError::Link`].
+    pub(super) fn check_output(&self) -> std::result::Result<(), FolderError> {
+        no_link(self.0.join("run.log"))?;
+        no_link(self.meshes())
     }
 
     /// Opens the folder of an existing run.
@@ -166,7 +198,16 @@ fn holds_anything(entries: fs::ReadDir) -> bool {
         // Only unused space is at stake: not worth stopping for.
         let _ = fs::remove_file(entry.path());
     }
-    !others.is_empty()
+    others.iter().any(|entry| entry.file_name() != lock::FILE)
+}
+
+/// Nothing is written through a symbolic link in a run's folder: a run may come from anywhere, and its links lead
+/// where its maker chose. Files that are written anew replace a link.
+fn no_link(path: PathBuf) -> std::result::Result<(), FolderError> {
+    match fs::symlink_metadata(&path) {
+        Ok(found) if found.is_symlink() => Err(FolderError::Link(path)),
+        _ => Ok(()),
+    }
 }
 
 #[cfg(test)]
@@ -181,7 +222,7 @@ mod tests {
         fs::write(path.join("mine.txt"), "kept").expect("a file of the user's");
         let refused = RunFolder::create(&path, "second", false).expect_err("it exists");
         assert!(refused.to_string().contains("replace it"), "{refused}");
-        let run = RunFolder::create(&path, "second", true).expect("replaced");
+        let (run, _lock) = RunFolder::create(&path, "second", true).expect("replaced");
         assert_eq!(
             fs::read_to_string(run.recipe()).expect("a recipe"),
             "second"
@@ -206,5 +247,36 @@ mod tests {
         fs::write(&torn, "half a rec").expect("written");
         RunFolder::create(folder.path(), "whole", false).expect("a new run");
         assert!(!torn.exists(), "nothing torn is left");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn nothing_is_written_through_links_in_a_run() {
+        use std::os::unix::fs::symlink;
+
+        let place = tempfile::tempdir().expect("a temporary folder");
+        let (path, elsewhere) = (place.path().join("run"), place.path().join("elsewhere"));
+        let (run, lock) = RunFolder::create(&path, "recipe", false).expect("a new run");
+        drop(lock);
+        fs::create_dir(&elsewhere).expect("a folder");
+        for name in ["checkpoints", "meshes", "run.log", "metrics.jsonl", ".lock"] {
+            let link = path.join(name);
+            let _ = fs::remove_file(&link);
+            symlink(&elsewhere, &link).expect("a link");
+            let refused = run.lock().expect_err("a link").to_string();
+            assert!(
+                refused.contains(name) && refused.contains("symbolic link"),
+                "{refused}"
+            );
+            fs::remove_file(&link).expect("removed");
+        }
+        run.lock().expect("no link any more");
+        // What is written whole takes the place of a link.
+        let mine = elsewhere.join("mine.txt");
+        fs::write(&mine, "kept").expect("written");
+        symlink(&mine, run.report()).expect("a link");
+        atomic::write_atomically(&run.report(), |out| out.write_all(b"page")).expect("written");
+        assert_eq!(fs::read(&mine).expect("still there"), b"kept");
+        assert!(!run.report().is_symlink());
     }
 }

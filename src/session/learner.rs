@@ -10,6 +10,7 @@ use isomorph_training::method;
 use isomorph_training::records::BURN_VERSION;
 
 use super::checkpoint::{self, Checkpoint, CheckpointError, State};
+use super::self_test;
 use crate::event::{Event, StepReport, TermReport};
 use crate::memory;
 use crate::recipe::{Change, Recipe};
@@ -19,19 +20,17 @@ use crate::solved::{Solved, guide};
 /// Why training stopped before its last step.
 #[derive(Debug, thiserror::Error)]
 pub enum LearnerError {
-    /// A term of the objective is not a number any more.
-    #[error("step {step}: the {term} term is {value}; {last}; {cure}")]
+    /// A term of the objective or a weight is not a number any more.
+    #[error(
+        "step {step}: {what}; {last}; try a smaller training.learning-rate, or let training go back by itself with checkpoint.step-backs=3"
+    )]
     NotFinite {
         /// The step, counted from 1.
         step: usize,
-        /// The first such term.
-        term: &'static str,
-        /// What it is.
-        value: f64,
+        /// The first such term and its value, or the network.
+        what: String,
         /// Where the last good checkpoint is.
         last: String,
-        /// What to try.
-        cure: &'static str,
     },
     /// The method needs what the shapes do not have.
     #[error("{0}")]
@@ -57,6 +56,20 @@ pub enum LearnerError {
         "{0}: the shapes are not those that this run was started with (their joint size or place differs); restore the files, or start a new run"
     )]
     OtherShapes(PathBuf),
+    /// The device computes something else than a processor does.
+    #[error(
+        "{device}: computes wrong numbers: the {what} is off by {off:.1e} of its size, and {allowed:.0e} is allowed; update the driver, choose another device with --device, or train with --backend flex"
+    )]
+    WrongNumbers {
+        /// The device.
+        device: String,
+        /// What it computed.
+        what: String,
+        /// How far off, relative to the processor's result.
+        off: f64,
+        /// What is allowed.
+        allowed: f64,
+    },
     /// The method does not run on the backend.
     #[error(transparent)]
     NotHere(#[from] NotHere),
@@ -138,6 +151,7 @@ impl Learner {
         } else {
             engine.method(&trained, &data.bounds)?
         };
+        notes.extend(self_test::before_training(engine, &recipe)?);
         // A solver of our own, which no backend takes part in.
         let (backend, device) = match is_solved {
             true => (SOLVER.to_owned(), "CPU".to_owned()),
@@ -210,7 +224,7 @@ impl Learner {
         emit: &mut dyn FnMut(Event) -> std::io::Result<()>,
         preview: &mut dyn FnMut(&dyn Trainer) -> Result<(), String>,
     ) -> Result<Outcome, LearnerError> {
-        checkpoint::sweep(checkpoints);
+        checkpoint::sweep(checkpoints, self.recipe.checkpoint.keep);
         emit(self.started())?;
         for note in self.notes.drain(..) {
             emit(Event::Note(note))?;
@@ -318,26 +332,35 @@ impl Learner {
                 self.step
             )));
         }
-        let last = match checkpoint::list(checkpoints).last() {
-            Some((step, _)) => format!("last good checkpoint step-{step:06}"),
-            None => "no checkpoint was written before".to_owned(),
-        };
-        Err(LearnerError::NotFinite {
-            step: self.step,
-            term: term.name,
-            value: term.raw,
-            last,
-            cure: "try a smaller training.learning-rate",
-        })
+        let what = format!("the {} term is {}", term.name, term.raw);
+        Err(self.not_finite(what, checkpoints))
     }
 
-    /// Writes a checkpoint of the present state.
+    fn not_finite(&self, what: String, checkpoints: &Path) -> LearnerError {
+        LearnerError::NotFinite {
+            step: self.step,
+            what,
+            last: match checkpoint::list(checkpoints).last() {
+                Some((step, _)) => format!("last good checkpoint step-{step:06}"),
+                None => "no checkpoint was written before".to_owned(),
+            },
+        }
+    }
+
+    /// Writes a checkpoint of the present state, whose weights are numbers: a good one.
     fn save(
         &self,
         checkpoints: &Path,
         emit: &mut dyn FnMut(Event) -> std::io::Result<()>,
     ) -> Result<(), LearnerError> {
         let files = self.trainer.records()?;
+        // The terms were read before the weights were moved.
+        if !method::spline::is_solved(&self.recipe)
+            && let Some(file) = files.not_finite()
+        {
+            let what = format!("{file} would hold numbers that are not finite");
+            return Err(self.not_finite(what, checkpoints));
+        }
         let keep = self.recipe.checkpoint.keep;
         let path = checkpoint::save(checkpoints, self.state(), files, keep)?;
         emit(Event::Checkpoint {

@@ -140,6 +140,25 @@ fn resumes_to_the_same_weights(keys: &[&str]) {
 }
 
 #[test]
+fn what_a_kill_left_to_delete_goes_when_the_run_goes_on() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    train(&mut learner(&[]), folder.path(), None);
+    // Killed between the newest checkpoint and the deletion of the oldest, and within a deletion.
+    for left in ["step-000004", ".step-000002-old"] {
+        std::fs::create_dir(folder.path().join(left)).expect("a folder");
+    }
+    let newest = Checkpoint::newest(folder.path()).expect("at the end");
+    let mut again = resumed(recipe(&[]), &spheres(), &newest).expect("resumes");
+    train(&mut again, folder.path(), None);
+    let mut left: Vec<_> = std::fs::read_dir(folder.path())
+        .expect("a folder")
+        .map(|entry| entry.expect("an entry").file_name())
+        .collect();
+    left.sort();
+    assert_eq!(left, ["step-000008", "step-000010"]);
+}
+
+#[test]
 fn other_networks_and_other_shapes_are_refused() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     train(&mut learner(&[]), folder.path(), None);

@@ -19,7 +19,8 @@
 //! | `prepare.rs` | the shapes of a recipe made ready |
 //! | `learner.rs` | the loop that trains a method |
 //! | `learned.rs` | from a method or a checkpoint to surfaces and motion |
-//! | `folder.rs`, `checkpoint.rs` | the folder of a run, and whole checkpoints or none |
+//! | `folder.rs`, `lock.rs`, `checkpoint.rs` | the folder of a run, for one process, and whole checkpoints or none |
+//! | `self_test.rs` | a device held against a processor before it trains |
 //! | `log.rs`, `metrics.rs` | what a run leaves in writing: `run.log`, `metrics.jsonl` |
 //! | `stop.rs` | a flag that ends the work early |
 
@@ -37,6 +38,7 @@ pub(crate) mod extract;
 pub(crate) mod folder;
 mod learned;
 pub(crate) mod learner;
+mod lock;
 mod log;
 mod measure;
 pub(crate) mod metrics;
@@ -50,6 +52,7 @@ mod report_data;
 mod report_log;
 mod report_truth;
 pub(crate) mod sampled_field;
+pub(crate) mod self_test;
 pub(crate) mod stop;
 pub(crate) mod train;
 pub(crate) mod trained;

@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 use isomorph_training::engine::{Engine, Trainer};
 
 use super::against_input::End;
-use super::checkpoint::{Checkpoint, CheckpointError};
+use super::checkpoint::{self, Checkpoint, CheckpointError};
 use super::folder::RunFolder;
 use super::learned::{self, Frame};
-use super::learner::{self, Learner, Outcome};
+use super::learner::{self, Learner, LearnerError, Outcome};
+use super::lock::RunLock;
 use super::log::RunLog;
 use super::prepare::{self, Prepared};
 use super::stop::StopFlag;
@@ -203,22 +204,19 @@ impl Session {
             Start::New { replace } => self.begin(*replace, on_event)?,
             Start::GoOn { .. } => self.go_on(on_event)?,
         };
+        let mut step_backs = self.recipe.checkpoint.step_backs;
+        let mut tried = None;
+        let outcome = loop {
+            match self.trained_to_the_end(&mut begun, on_event) {
+                Err(LearnerError::NotFinite { step, what, .. }) if step_backs > 0 => {
+                    step_backs -= 1;
+                    let why = format!("step {step}: {what}");
+                    (begun, tried) = self.step_back(begun, &why, tried, on_event)?;
+                }
+                ended => break ended?,
+            }
+        };
         let (run, log) = (&begun.run, &mut begun.log);
-        let mut emit = |event: Event| {
-            on_event(&event);
-            log.record(&event)
-        };
-        let (recipe, frame) = (&self.recipe, begun.frame);
-        let mut preview = |trainer: &dyn Trainer| -> std::result::Result<(), String> {
-            let learned = learned::learned(trainer.deformation(), recipe, frame);
-            let shown = learned
-                .and_then(|learned| Trained::new(learned, recipe.clone(), run.clone()).preview());
-            shown.map_err(|error| error.to_string())
-        };
-        let (checkpoints, stop) = (run.checkpoints(), self.stop.flag());
-        let outcome = begun
-            .learner
-            .run_with(&checkpoints, stop, &mut emit, &mut preview)?;
         // What is done is the run's: training again goes on from there.
         self.start = Start::GoOn {
             checkpoint: Checkpoint::newest(&run.checkpoints()).ok().map(Box::new),
@@ -260,20 +258,75 @@ impl Session {
         Ok(trained)
     }
 
+    /// Trains to the last step, or until it is stopped, with previews.
+    fn trained_to_the_end(
+        &self,
+        begun: &mut Begun,
+        on_event: &mut dyn FnMut(&Event),
+    ) -> std::result::Result<Outcome, LearnerError> {
+        let (run, log) = (&begun.run, &mut begun.log);
+        let mut emit = |event: Event| {
+            on_event(&event);
+            log.record(&event)
+        };
+        let (recipe, frame) = (&self.recipe, begun.frame);
+        let mut preview = |trainer: &dyn Trainer| -> std::result::Result<(), String> {
+            let learned = learned::learned(trainer.deformation(), recipe, frame);
+            let shown = learned
+                .and_then(|learned| Trained::new(learned, recipe.clone(), run.clone()).preview());
+            shown.map_err(|error| error.to_string())
+        };
+        let (checkpoints, stop) = (run.checkpoints(), self.stop.flag());
+        begun
+            .learner
+            .run_with(&checkpoints, stop, &mut emit, &mut preview)
+    }
+
+    /// The run at its newest checkpoint, with half of all learning rates, and the step of that. Where training came
+    /// no further from the checkpoint of step `tried`, that one is beyond repair and deleted.
+    fn step_back(
+        &mut self,
+        begun: Begun,
+        why: &str,
+        tried: Option<usize>,
+        on_event: &mut dyn FnMut(&Event),
+    ) -> Result<(Begun, Option<usize>)> {
+        let checkpoints = begun.run.checkpoints();
+        if let Some((step, path)) = checkpoint::list(&checkpoints).last()
+            && Some(*step) == tried
+        {
+            checkpoint::remove(path, *step)?;
+        }
+        let back_to = checkpoint::list(&checkpoints).last().map(|(step, _)| *step);
+        // It is opened again as any run that goes on is, and locked then.
+        drop(begun);
+        self.recipe = self.recipe.clone().with_rates_times(0.5);
+        self.start = Start::GoOn {
+            checkpoint: Checkpoint::newest(&checkpoints).ok().map(Box::new),
+            rewrite: true,
+            notes: vec![format!(
+                "{why}: training goes back to step {}, with half of all learning rates (checkpoint.step-backs)",
+                back_to.unwrap_or(0)
+            )],
+        };
+        Ok((self.go_on(on_event)?, back_to))
+    }
+
     /// A run before its first step: everything is checked before its folder is made.
     fn begin(&self, replace: bool, on_event: &mut dyn FnMut(&Event)) -> Result<Begun> {
         let prepared = prepare::prepare(&self.recipe, &self.shapes, None, on_event)?;
         learned::check(&self.recipe, &prepared.keyframes.normalisation)?;
         let learner = Learner::new(self.recipe.clone(), &prepared.keyframes, &*self.engine)?;
-        let run = RunFolder::create(&self.folder, &self.recipe.to_toml(), replace)?;
+        let (run, lock) = RunFolder::create(&self.folder, &self.recipe.to_toml(), replace)?;
         let mut log = RunLog::open(run.path(), None)?;
         let matched = prepared.keep(&run)?;
         let notes = prepared.keyframes.notes.iter().cloned().map(Event::Note);
-        for event in matched.into_iter().chain(notes) {
+        let unlocked = lock.note().map(Event::Note);
+        for event in matched.into_iter().chain(notes).chain(unlocked) {
             on_event(&event);
             log.record(&event)?;
         }
-        Ok(Begun::new(run, log, learner, &prepared))
+        Ok(Begun::new(run, lock, log, learner, &prepared))
     }
 
     /// A run where its newest checkpoint left it: what is refused leaves it as it was.
@@ -287,6 +340,7 @@ impl Session {
             unreachable!("a run that goes on");
         };
         let run = RunFolder::open(&self.folder)?;
+        let lock = run.lock()?;
         let pairs = run.pairs();
         let prepared = prepare::prepare(&self.recipe, &self.shapes, Some(&pairs), on_event)?;
         let keyframes = &prepared.keyframes;
@@ -306,6 +360,7 @@ impl Session {
         let step = checkpoint.as_ref().map_or(0, |found| found.state.step);
         let mut log = RunLog::open(run.path(), Some(step))?;
         let mut events: Vec<Event> = prepared.keep(&run)?.into_iter().collect();
+        events.extend(lock.note().map(Event::Note));
         events.extend(notes.iter().cloned().map(Event::Note));
         if checkpoint.is_none() {
             let note = "no checkpoint yet: the run starts again from its first step";
@@ -323,7 +378,7 @@ impl Session {
             let text = self.recipe.to_toml();
             write_atomically(&run.recipe(), |out| out.write_all(text.as_bytes()))?;
         }
-        Ok(Begun::new(run, log, learner, &prepared))
+        Ok(Begun::new(run, lock, log, learner, &prepared))
     }
 }
 
@@ -344,6 +399,7 @@ fn reported(
 /// A run whose folder is there and whose learner is ready.
 struct Begun {
     run: RunFolder,
+    _lock: RunLock,
     log: RunLog,
     learner: Learner,
     frame: Frame,
@@ -351,10 +407,17 @@ struct Begun {
 }
 
 impl Begun {
-    fn new(run: RunFolder, log: RunLog, learner: Learner, prepared: &Prepared) -> Self {
+    fn new(
+        run: RunFolder,
+        lock: RunLock,
+        log: RunLog,
+        learner: Learner,
+        prepared: &Prepared,
+    ) -> Self {
         let keyframes = &prepared.keyframes;
         Self {
             run,
+            _lock: lock,
             log,
             learner,
             ends: End::both(&keyframes.keys),

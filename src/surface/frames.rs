@@ -15,7 +15,7 @@ use super::error::{FramesError, no_motion};
 use super::layers::{LayerEntry, write_layers};
 use super::learned::{Found, Learned};
 use super::trust::{Trust, TrustMap};
-use crate::atomic::write_atomically;
+use crate::atomic::{sweep, write_atomically};
 use crate::cubes::Grid;
 use crate::formats::{
     self, Shape, SurfaceFormat, carried_extension, rewrite_vertices, write_surface_with,
@@ -169,6 +169,7 @@ pub(crate) fn write_frames(
         Some(source) => carry(learned, source, options)?,
         None => vec![None; options.times.len()],
     };
+    sweep(&options.folder);
     let mut frames = Vec::new();
     let mut stills = Vec::new();
     for (k, carried) in carried.into_iter().enumerate() {

@@ -173,3 +173,24 @@ fn wgpu_agrees_with_ndarray() {
         }
     }
 }
+
+#[test]
+fn the_gpu_is_compared_with_a_processor_before_it_trains_and_by_a_command_of_its_own() {
+    let _turn = turn();
+    let place = Workplace::tiny(PHASES);
+    place.train("run", &["--backend", "wgpu"]);
+    let log = std::fs::read_to_string(place.path("run/run.log")).expect("a log");
+    let note = "computes what a processor does: 8 operations of this run agree";
+    assert!(log.contains(note), "{log}");
+    let ended = place
+        .isomorph(&["self-test", "recipe.toml", "--json"])
+        .succeeded();
+    let test: serde_json::Value = serde_json::from_str(&ended.stdout).expect("JSON");
+    // The driver's own name, by which results are filed.
+    let device = test["device"].as_str().expect("a name");
+    assert!(device.contains('('), "{device}");
+    for operation in test["operations"].as_array().expect("a list") {
+        let off = operation["off"].as_f64().expect("a number");
+        assert!((0.0..1e-4).contains(&off), "{operation}");
+    }
+}

@@ -211,3 +211,71 @@ fn an_interrupt_says_how_to_go_on() {
     assert!(last.contains("isomorph resume run"), "{told}");
     assert!(!told.contains("error:"), "{told}");
 }
+
+#[test]
+fn a_run_in_training_is_locked_for_others_and_names_who_has_it() {
+    let _turn = turn();
+    let place = Workplace::tiny(LONGER);
+    let mut first = start(&place, TRAIN);
+    let run = place.run("run");
+    wait_until("the first line of the metrics", || {
+        holds_a_line(&run.path("metrics.jsonl"))
+    });
+    let again = [TRAIN, &["--force"]].concat();
+    for second in [RESUME, &again] {
+        let who = format!("process {}", first.id());
+        place.isomorph(second).refused(2, &["in use", &who]);
+    }
+    first.kill().expect("SIGKILL");
+    first.wait().expect("a child that was killed");
+    // The lock has ended with its process.
+    place.isomorph(RESUME).succeeded();
+    assert_eq!(run.step(), 1000);
+}
+
+/// With these rates velocities grow beyond all numbers in the first steps, with most seeds.
+const OVERFLOWS: &[&str] = &[
+    "training.steps = 30",
+    "training.learning-rate = 1",
+    "training.velocity-learning-rate = 1",
+    "training.clip = 0",
+    "training.batch = 100",
+    "training.correspondence-batch = 20",
+    "implicit.depth = 2",
+    "implicit.width = 8",
+    "velocity.depth = 4",
+    "velocity.width = 16",
+    "data.points = 2000",
+    "result.frames = 0",
+    "checkpoint.every = 5",
+];
+
+#[test]
+fn numbers_that_are_not_finite_end_a_run_or_take_it_back_with_smaller_rates() {
+    let _turn = turn();
+    let place = Workplace::tiny_with(&[], OVERFLOWS);
+    let mut taken_back = 0;
+    for seed in 0..5 {
+        let seed = format!("training.seed={seed}");
+        let set = ["--set", "preset=paper", "--set", &seed, "--force"];
+        let train = [TRAIN, &set].concat();
+        let ended = place.isomorph(&train);
+        let run = place.run("run");
+        if ended.code == Some(0) {
+            continue;
+        }
+        ended.refused(1, &["step ", "checkpoint.step-backs"]);
+        let back = ["--set", "checkpoint.step-backs=10"];
+        place.isomorph(&[&train[..], &back].concat()).succeeded();
+        assert_eq!(run.step(), 30, "{seed}");
+        let log = fs::read_to_string(run.path("run.log")).expect("a log");
+        let note = ", with half of all learning rates";
+        let times = log.matches(note).count();
+        assert!((1..=10).contains(&times), "{log}");
+        let rate = format!("\nlearning-rate = {}\n", 0.5_f64.powi(times as i32));
+        let recipe = fs::read_to_string(run.path("recipe.toml")).expect("a recipe");
+        assert!(recipe.contains(&rate), "{rate} in {recipe}");
+        taken_back += 1;
+    }
+    assert!(taken_back > 0, "no seed overflows");
+}

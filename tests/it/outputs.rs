@@ -35,6 +35,7 @@ fn training_leaves_a_whole_run_and_nothing_else() {
     let place = Workplace::tiny(KEYS);
     let run = place.train("run", SURFACES);
     let wanted = [
+        ".lock",
         "checkpoints",
         "meshes",
         "metrics.jsonl",

@@ -125,7 +125,7 @@ fn a_cloud_has_no_triangles_and_normals_only_if_the_file_has() {
         "ply\r\nformat ascii 1.0\r\nelement vertex 64\r\nproperty double x\r\n\
          property double y\r\nproperty double z\r\nend_header\r\n",
     );
-    (0..64).for_each(|i| writeln!(text, "500000.123456789 {i} -1.5e-3\r").expect("grows"));
+    (0..64).for_each(|i| writeln!(text, "500000.123456789 {i} {}.0015\r", i * i).expect("grows"));
     let cloud = read_bytes(text.as_bytes()).expect("read");
     assert_eq!(
         (
@@ -137,7 +137,7 @@ fn a_cloud_has_no_triangles_and_normals_only_if_the_file_has() {
     );
     assert_eq!(
         cloud.mesh.vertices[63],
-        [500_000.123_456_789, 63.0, -0.0015]
+        [500_000.123_456_789, 63.0, 3969.0015]
     );
 }
 

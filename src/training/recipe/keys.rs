@@ -312,6 +312,9 @@ section! {
         every: usize = 9 | 100 | 100 | 1_000 | 1_000, Rule::whole(1, MANY).unit("steps");
         /// Number of newest checkpoints that are kept.
         keep: usize = 3 | 3 | 3 | 3 | 3, Rule::whole(1, MANY);
+        /// How often training may go back to the newest checkpoint, with half of all learning rates, where a
+        /// term or a weight is no number any more. Splines have no learning rates, and end.
+        step_backs: usize = 0 | 0 | 0 | 0 | 0, Rule::whole(0, 100).zero("ends with an error");
     }
 }
 

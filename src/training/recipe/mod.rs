@@ -111,6 +111,21 @@ pub struct MethodRecipe {
 }
 
 impl Recipe {
+    /// The same with all learning rates multiplied by a factor.
+    #[must_use]
+    pub fn with_rates_times(mut self, factor: f64) -> Self {
+        let training = &mut self.training;
+        for rate in [
+            &mut training.learning_rate,
+            &mut training.velocity_learning_rate,
+            &mut training.muon_rate,
+            &mut training.velocity_muon_rate,
+        ] {
+            *rate *= factor;
+        }
+        self
+    }
+
     /// The keys that the recipe's method has alone.
     ///
     /// # Panics

@@ -33,9 +33,9 @@ preset = 'fast'
 loss = 5
     loss = 5: must be a section: [loss] on a line of its own, once
 checkpoint.evry = 5
-    checkpoint.evry: no such key; did you mean every? ([checkpoint] has every, keep)
+    checkpoint.evry: no such key; did you mean every? ([checkpoint] has every, keep, step-backs)
 checkpoint."ev\u001bry" = 5
-    checkpoint.ev�ry: no such key; did you mean every? ([checkpoint] has every, keep)
+    checkpoint.ev�ry: no such key; did you mean every? ([checkpoint] has every, keep, step-backs)
 result.steps = 5
     result.steps: no such key; it belongs in [training] ([result] has frames, resolution, preview-every, smallest-component)
 result.zzz = 5

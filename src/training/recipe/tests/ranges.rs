@@ -96,6 +96,7 @@ training.seed                  0       -1       9223372036854775807 922337203685
 training.log-every             1       0        10000000 10000001
 checkpoint.every               1       0        10000000 10000001
 checkpoint.keep                1       0        10000000 10000001
+checkpoint.step-backs          0       -1       100      101
 result.frames                  0       -1       1000     1001
 result.resolution              8       7        2048     2049
 result.preview-every           0       -1       10000000 10000001
