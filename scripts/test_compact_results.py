@@ -15,7 +15,9 @@ sys.path.insert(0, str(Path(__file__).parent))
 import as_rigid
 import compact_results
 import fake_isomorph
+import gpu
 import instant_scaling
+import kills
 import matching
 import peers
 import protocol
@@ -211,9 +213,12 @@ class Kept(unittest.TestCase):
         if "experiment" in content:
             measured = runs.measured([], compact.unpack(content))
             return report.markdown(content["experiment"], content, measured)
+        if path.parent.parent.name == "gpu":
+            return gpu.markdown(content)
         makers = {
             "as-rigid": as_rigid,
             "instant-scaling": instant_scaling,
+            "kills": kills,
             "matching": matching,
             "peers": peers,
             "scaling": scaling,
@@ -221,7 +226,7 @@ class Kept(unittest.TestCase):
         return makers.get(path.parent.name, protocol).markdown(content)
 
     def test_each_table_is_that_of_its_numbers(self):
-        found = sorted(RESULTS.glob("*/*.json"))
+        found = sorted(RESULTS.glob("*/*.json")) + sorted(RESULTS.glob("gpu/*/*.json"))
         self.assertGreater(len(found), 20)
         for path in found:
             with self.subTest(path.parent.name):

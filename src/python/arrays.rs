@@ -14,7 +14,9 @@ pub(crate) fn rows<'a, T: numpy::Element>(
 ) -> PyResult<&'a [[T; 3]]> {
     if array.shape()[1] != 3 {
         let shape = array.shape();
-        return Err(PyValueError::new_err(format!("{name}: shape {shape:?}: must be (n, 3)")));
+        return Err(PyValueError::new_err(format!(
+            "{name}: shape {shape:?}: must be (n, 3)"
+        )));
     }
     let values = array
         .as_slice()

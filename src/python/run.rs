@@ -62,7 +62,9 @@ impl Run {
         Bound<'py, PyArray2<u32>>,
         Bound<'py, PyArray2<f32>>,
     )> {
-        let found = py.detach(|| self.0.surface(t, resolution)).map_err(raised)?;
+        let found = py
+            .detach(|| self.0.surface(t, resolution))
+            .map_err(raised)?;
         let mesh = found.mesh;
         Ok((
             array(py, mesh.vertices)?,

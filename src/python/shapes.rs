@@ -19,6 +19,9 @@ type Parts<'py> = (
     Vec<String>,
 );
 
+/// Pairs of vertices, and how sure each is.
+type Pairs<'py> = (Bound<'py, PyArray2<u32>>, Bound<'py, PyArray1<f64>>);
+
 /// Reads a file.
 #[pyfunction]
 pub(crate) fn read_shape(py: Python<'_>, path: PathBuf) -> PyResult<Parts<'_>> {
@@ -62,12 +65,18 @@ pub(crate) fn estimate_normals<'py>(
 #[pyo3(signature = (source, target, aligned, least_confidence, on_event))]
 pub(crate) fn match_shapes<'py>(
     py: Python<'py>,
-    source: (PyReadonlyArray2<'py, f64>, Option<PyReadonlyArray2<'py, u32>>),
-    target: (PyReadonlyArray2<'py, f64>, Option<PyReadonlyArray2<'py, u32>>),
+    source: (
+        PyReadonlyArray2<'py, f64>,
+        Option<PyReadonlyArray2<'py, u32>>,
+    ),
+    target: (
+        PyReadonlyArray2<'py, f64>,
+        Option<PyReadonlyArray2<'py, u32>>,
+    ),
     aligned: bool,
     least_confidence: f64,
     on_event: Option<Py<PyAny>>,
-) -> PyResult<(Bound<'py, PyArray2<u32>>, Bound<'py, PyArray1<f64>>)> {
+) -> PyResult<Pairs<'py>> {
     let source = of(&source.0, source.1.as_ref(), None)?;
     let target = of(&target.0, target.1.as_ref(), None)?;
     let options = MatchOptions {
@@ -76,9 +85,8 @@ pub(crate) fn match_shapes<'py>(
         ..MatchOptions::default()
     };
     let mut watch = Watch::new(on_event, StopFlag::default());
-    let found = py.detach(|| {
-        correspondence::find(&source, &target, &options, |event| watch.hear(event))
-    });
+    let found =
+        py.detach(|| correspondence::find(&source, &target, &options, |event| watch.hear(event)));
     let found = watch.end(found)?;
     let pairs = found.pairs.iter().map(|pair| [pair.source, pair.target]);
     let sure = found.pairs.iter().map(|pair| pair.confidence).collect();
@@ -95,7 +103,9 @@ fn of(
         rows(vertices, "vertices")?.to_vec(),
         faces.unwrap_or_default().to_vec(),
     );
-    let normals = normals.map(|normals| rows(normals, "normals")).transpose()?;
+    let normals = normals
+        .map(|normals| rows(normals, "normals"))
+        .transpose()?;
     mesh.normals = normals.map(<[[f32; 3]]>::to_vec);
     Ok(Shape::of(mesh))
 }

@@ -17,6 +17,9 @@ pub(crate) fn recipe(text: &str, origin: PathBuf, changes: Vec<String>) -> PyRes
     Ok(recipe.to_toml())
 }
 
+/// A recipe, what it takes for granted, and what may be wrong with it: a finding and a cure each.
+type Plan = (String, Vec<String>, Vec<(String, String)>);
+
 /// A recipe for two files as TOML, what it takes for granted, and what may be wrong with it.
 #[pyfunction]
 pub(crate) fn plan(
@@ -27,7 +30,7 @@ pub(crate) fn plan(
     pairs: Option<String>,
     frames: usize,
     changes: Vec<String>,
-) -> PyResult<(String, Vec<String>, Vec<(String, String)>)> {
+) -> PyResult<Plan> {
     let options = MorphOptions {
         pairs,
         preset,
@@ -36,7 +39,10 @@ pub(crate) fn plan(
     };
     let plan = py.detach(|| plan_morph(&source, &target, &options));
     let plan = plan.map_err(raised)?;
-    let doubts = plan.doubts.into_iter().map(|doubt| (doubt.finding, doubt.cure));
+    let doubts = plan
+        .doubts
+        .into_iter()
+        .map(|doubt| (doubt.finding, doubt.cure));
     Ok((plan.recipe.to_toml(), plan.assumed, doubts.collect()))
 }
 
@@ -55,7 +61,11 @@ pub(crate) fn train(
     let recipe = parsed(text, &origin, &changes)?;
     let session = py.detach(|| Session::prepare(recipe, &run, Backend::Flex));
     let session = session.map_err(raised)?;
-    let session = if replace { session.replacing() } else { session };
+    let session = if replace {
+        session.replacing()
+    } else {
+        session
+    };
     trained(py, session, on_event)
 }
 

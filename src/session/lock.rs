@@ -4,7 +4,7 @@
 //! the process for others.
 
 use std::fs::{File, OpenOptions, TryLockError};
-use std::io::{self, Read, Seek, Write};
+use std::io::{self, Seek, Write};
 use std::path::Path;
 use std::time::SystemTime;
 
@@ -42,9 +42,8 @@ impl RunLock {
         match file.try_lock() {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => {
-                let mut holder = String::new();
                 // It only says who; a lock without it is one all the same.
-                let _ = file.read_to_string(&mut holder);
+                let holder = std::fs::read_to_string(folder.join(FILE)).unwrap_or_default();
                 return Err(FolderError::Busy {
                     path: folder.to_path_buf(),
                     holder: match holder.trim() {

@@ -230,10 +230,13 @@ mod tests {
         recipe
     }
 
+    /// A change of readings.
+    type Change = fn(&mut Vec<Reading>);
+
     /// An engine of a processor that claims to be a device, with readings that are changed.
     struct Device {
         inner: Box<dyn Engine>,
-        change: fn(&mut Vec<Reading>),
+        change: Change,
     }
 
     impl Engine for Device {
@@ -271,7 +274,7 @@ mod tests {
         }
     }
 
-    fn device(backend: Backend, change: fn(&mut Vec<Reading>)) -> Device {
+    fn device(backend: Backend, change: Change) -> Device {
         Device {
             inner: backend.open().expect("it is compiled in"),
             change,
@@ -305,7 +308,7 @@ mod tests {
     #[test]
     fn wrong_numbers_end_training_before_its_first_step_with_a_sentence() {
         // One row of a product, one array of a gradient, one number that is none.
-        let changes: [(fn(&mut Vec<Reading>), &str); 3] = [
+        let changes: [(Change, &str); 3] = [
             (
                 |readings| readings[0].parts[0][..16].fill(0.0),
                 "matrix product (64 x 16 by 16 x 16)",

@@ -82,7 +82,7 @@ fn sorted(bytes: &[u8]) -> io::Result<Vec<u8>> {
 fn sort(value: &mut Value) {
     match value {
         Value::Map(entries) => {
-            entries.sort_by(|(a, _), (b, _)| a.to_string().cmp(&b.to_string()));
+            entries.sort_by_cached_key(|(key, _)| key.to_string());
             entries.iter_mut().for_each(|(_, value)| sort(value));
         }
         Value::Array(values) => values.iter_mut().for_each(sort),

@@ -9,7 +9,11 @@ fn place() -> &'static Path {
     static PLACE: std::sync::OnceLock<PathBuf> = std::sync::OnceLock::new();
     PLACE.get_or_init(|| {
         let memory = Path::new("/dev/shm");
-        let base = if memory.is_dir() { memory.to_path_buf() } else { std::env::temp_dir() };
+        let base = if memory.is_dir() {
+            memory.to_path_buf()
+        } else {
+            std::env::temp_dir()
+        };
         let place = base.join(format!("isomorph-fuzz-{}", std::process::id()));
         std::fs::create_dir_all(&place).expect("a folder");
         place
@@ -37,12 +41,23 @@ pub fn shape(ending: &str, bytes: &[u8]) {
             let mesh = &shape.mesh;
             let count = mesh.vertices.len();
             // Numbers of an archive are compressed: a thousand times at most.
-            let most = if ending == "npz" { 1100 * bytes.len() } else { bytes.len() };
-            assert!(count <= most && mesh.triangles.len() <= most, "larger than its file");
+            let most = if ending == "npz" {
+                1100 * bytes.len()
+            } else {
+                bytes.len()
+            };
+            assert!(
+                count <= most && mesh.triangles.len() <= most,
+                "larger than its file"
+            );
             assert!(mesh.vertices.iter().flatten().all(|x| x.is_finite()));
             let corners = mesh.triangles.iter().flatten();
             assert!(corners.copied().all(|at| (at as usize) < count));
-            assert!(mesh.normals.as_ref().is_none_or(|normals| normals.len() == count));
+            assert!(
+                mesh.normals
+                    .as_ref()
+                    .is_none_or(|normals| normals.len() == count)
+            );
         }
     }
 }

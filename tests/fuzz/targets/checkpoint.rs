@@ -30,7 +30,9 @@ const RUNS: [Stored; 2] = [
 // The first byte chooses the run and the file in it that the others are. Its checksum is right: this is no damage
 // by chance.
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
-    let Some((which, bytes)) = bytes.split_first() else { return };
+    let Some((which, bytes)) = bytes.split_first() else {
+        return;
+    };
     let run = &RUNS[usize::from(which >> 1) % 2];
     let (velocity, ends) = match which & 1 {
         0 => (bytes, run.ends),
@@ -43,7 +45,10 @@ libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
         state["files"][name] = digest;
         written(&format!("{folder}/{name}"), content);
     }
-    written(&format!("{folder}/state.json"), state.to_string().as_bytes());
+    written(
+        &format!("{folder}/state.json"),
+        state.to_string().as_bytes(),
+    );
     let recipe = written("run/recipe.toml", run.recipe.as_bytes());
     let place = recipe.parent().expect("it lies in a folder");
     match Trained::open(place, Backend::Ndarray) {

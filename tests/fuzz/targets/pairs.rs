@@ -5,7 +5,9 @@ use isomorph::correspondence::known_pairs;
 
 // The first byte chooses the kind of file.
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
-    let Some((kind, bytes)) = bytes.split_first() else { return };
+    let Some((kind, bytes)) = bytes.split_first() else {
+        return;
+    };
     let name = ["pairs.csv", "pairs.npy", "pairs.vts", "pairs.txt"][usize::from(*kind) % 4];
     let path = isomorph_fuzz::written(name, bytes);
     let corner = |k: i32| [k, k * k % 7, k % 3].map(f64::from);

@@ -4,7 +4,10 @@
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
     let mut parts = bytes.split(|byte| *byte == 0);
     let recipe = isomorph_fuzz::written("run/recipe.toml", parts.next().unwrap_or_default());
-    let files = ["run/metrics.jsonl", "run/checkpoints/step-000020/state.json"];
+    let files = [
+        "run/metrics.jsonl",
+        "run/checkpoints/step-000020/state.json",
+    ];
     for file in files {
         isomorph_fuzz::written(file, parts.next().unwrap_or_default());
     }
