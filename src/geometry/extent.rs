@@ -1,10 +1,15 @@
 //! Boxes round points in the user's coordinates; [`Bounds`](super::Bounds) are those in normalised ones.
 
+use super::linear::{difference, length};
+use super::mesh::Mesh;
+
 /// A box with its sides along the axes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Extent {
-    low: [f64; 3],
-    high: [f64; 3],
+    /// The lowest coordinates.
+    pub low: [f64; 3],
+    /// The highest.
+    pub high: [f64; 3],
 }
 
 impl Extent {
@@ -21,6 +26,22 @@ impl Extent {
         extent
     }
 
+    /// The box of what belongs to a surface: the vertices of triangles, or all points of a cloud.
+    pub(crate) fn of_surface(mesh: &Mesh<f64>) -> Self {
+        let corners = mesh.triangles.iter().flatten();
+        match mesh.triangles.is_empty() {
+            true => Self::of(mesh.vertices.iter().copied()),
+            false => Self::of(corners.map(|vertex| mesh.vertices[*vertex as usize])),
+        }
+    }
+
+    /// The box of two.
+    pub(crate) fn joined(mut self, other: &Self) -> Self {
+        self.include(other.low);
+        self.include(other.high);
+        self
+    }
+
     /// Grows to hold a point.
     pub(crate) fn include(&mut self, point: [f64; 3]) {
         self.low = [0, 1, 2].map(|axis| self.low[axis].min(point[axis]));
@@ -29,8 +50,12 @@ impl Extent {
 
     /// The length from corner to corner.
     pub(crate) fn diagonal(&self) -> f64 {
-        let sides = [0, 1, 2].map(|axis| self.high[axis] - self.low[axis]);
-        sides.iter().map(|side| side * side).sum::<f64>().sqrt()
+        length(self.sides())
+    }
+
+    /// The lengths along the axes.
+    pub(crate) fn sides(&self) -> [f64; 3] {
+        difference(self.high, self.low)
     }
 
     /// How far the boxes are apart; 0 where they meet.
@@ -42,7 +67,6 @@ impl Extent {
             );
             below.max(above).max(0.0)
         };
-        let gaps = [0, 1, 2].map(along);
-        gaps.iter().map(|gap| gap * gap).sum::<f64>().sqrt()
+        length([0, 1, 2].map(along))
     }
 }

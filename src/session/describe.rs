@@ -9,7 +9,7 @@ use super::checkpoint::{self, Checkpoint};
 use super::folder::RunFolder;
 use crate::error::{Error, Result};
 use crate::formats::{self, Sequence, Shape};
-use crate::geometry::EdgeSharing;
+use crate::geometry::{EdgeSharing, Extent};
 use crate::recipe::Recipe;
 use crate::shape::{CleanOptions, NormalSource, wound_outwards};
 
@@ -46,7 +46,7 @@ fn shape_info(shape: &Shape) -> Result<String> {
         "none"
     };
     writeln!(text, "normals      {normals}")?;
-    let (low, high) = box_of(&shape.mesh.vertices);
+    let Extent { low, high } = Extent::of(shape.mesh.vertices.iter().copied());
     writeln!(text, "box          {low:?} to {high:?}")?;
     let cleaned = shape.clone().cleaned(&CleanOptions::default());
     let left_out = cleaned.mesh.vertices.len() != shape.mesh.vertices.len();
@@ -137,16 +137,4 @@ fn run_info(path: &Path) -> Result<String> {
     let (centre, scale) = (state.normalisation.centre, state.normalisation.scale);
     writeln!(text, "normalised   (x - {centre:?}) * {scale}")?;
     Ok(text)
-}
-
-/// The lowest and the highest coordinates of points.
-pub(super) fn box_of(vertices: &[[f64; 3]]) -> ([f64; 3], [f64; 3]) {
-    let start = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    vertices.iter().fold(start, |(low, high), vertex| {
-        let low = std::array::from_fn(|axis| f64::min(low[axis], vertex[axis]));
-        (
-            low,
-            std::array::from_fn(|axis| f64::max(high[axis], vertex[axis])),
-        )
-    })
 }

@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use super::morph_size::Extent;
+use super::morph_size::Size;
 use crate::error::Result;
 use crate::event::Event;
 use crate::formats::Shape;
@@ -72,7 +72,7 @@ pub fn plan_morph(source: &Path, target: &Path, options: &MorphOptions) -> Resul
     ])?;
     recipe.with_all(&options.changes)?;
     let mut assumed: Vec<String> = shapes.iter().map(described).collect();
-    let extents = shapes.each_ref().map(Extent::of);
+    let extents = shapes.each_ref().map(Size::of);
     assumed.push(format!(
         "units: those of the files; {} and {} large",
         extents[0], extents[1]

@@ -2,18 +2,15 @@
 
 use std::fmt;
 
-use super::describe::box_of;
 use super::morph::Doubt;
 use crate::event::significant;
 use crate::formats::Shape;
+use crate::geometry::Extent;
 use crate::geometry::linear::{difference, length};
 
 /// The box round a shape, in the file's coordinates.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Extent {
-    low: [f64; 3],
-    high: [f64; 3],
-}
+pub(super) struct Size(Extent);
 
 /// Shapes of one thing whose sizes differ by more than this factor are likely in different units.
 const OTHER_UNIT: f64 = 3.0;
@@ -21,22 +18,14 @@ const OTHER_UNIT: f64 = 3.0;
 /// Boxes whose centres are further apart than this many of their sizes.
 const FAR_APART: f64 = 1.0;
 
-impl Extent {
+impl Size {
     pub(super) fn of(shape: &Shape) -> Self {
-        let (low, high) = box_of(&shape.mesh.vertices);
-        Self { low, high }
-    }
-
-    fn sides(&self) -> [f64; 3] {
-        difference(self.high, self.low)
-    }
-
-    fn size(&self) -> f64 {
-        length(self.sides())
+        Self(Extent::of(shape.mesh.vertices.iter().copied()))
     }
 
     fn centre(&self) -> [f64; 3] {
-        [0, 1, 2].map(|axis| f64::midpoint(self.low[axis], self.high[axis]))
+        let Extent { low, high } = self.0;
+        [0, 1, 2].map(|axis| f64::midpoint(low[axis], high[axis]))
     }
 
     /// The distance of the centres, for people.
@@ -47,7 +36,8 @@ impl Extent {
     /// What speaks against these being one thing in one frame.
     pub(super) fn doubts(&self, other: &Self) -> Vec<Doubt> {
         let mut doubts = Vec::new();
-        let (small, large) = (self.size().min(other.size()), self.size().max(other.size()));
+        let (own, others) = (self.0.diagonal(), other.0.diagonal());
+        let (small, large) = (own.min(others), own.max(others));
         if large > OTHER_UNIT * small {
             let finding = format!(
                 "one shape is {} times as large as the other",
@@ -70,9 +60,9 @@ impl Extent {
     }
 }
 
-impl fmt::Display for Extent {
+impl fmt::Display for Size {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [x, y, z] = self.sides().map(significant);
+        let [x, y, z] = self.0.sides().map(significant);
         write!(formatter, "{x} x {y} x {z}")
     }
 }
@@ -81,11 +71,11 @@ impl fmt::Display for Extent {
 mod tests {
     use super::*;
 
-    fn block(size: f64, x: f64) -> Extent {
-        Extent {
+    fn block(size: f64, x: f64) -> Size {
+        Size(Extent {
             low: [x, 0.0, 0.0],
             high: [x + size, size, size],
-        }
+        })
     }
 
     #[test]

@@ -9,7 +9,7 @@ use crate::formats::Shape;
 use crate::geometry::linear::{
     add, add_outer, cross, difference, dot, mean, symmetric_eigen, tangents,
 };
-use crate::geometry::{EdgeSharing, Extent, Mesh, NeighbourSearch};
+use crate::geometry::{EdgeSharing, Extent, NeighbourSearch};
 
 /// Shapes whose lengths differ by more than this are said to.
 const SIZES: f64 = 3.5;
@@ -168,7 +168,7 @@ pub(super) fn sheet(shape: &Shape) -> Option<String> {
 
 /// The bounding boxes of shapes that are far apart, in words.
 pub(super) fn distance([source, target]: [&Shape; 2]) -> Option<String> {
-    let (one, other) = (extent(&source.mesh), extent(&target.mesh));
+    let [one, other] = [source, target].map(|shape| Extent::of_surface(&shape.mesh));
     let largest = one.diagonal().max(other.diagonal());
     let gap = one.gap(&other);
     (gap > largest).then(|| {
@@ -181,22 +181,12 @@ pub(super) fn distance([source, target]: [&Shape; 2]) -> Option<String> {
     })
 }
 
-/// The box of what belongs to the surface.
-fn extent(mesh: &Mesh<f64>) -> Extent {
-    match mesh.triangles.is_empty() {
-        true => Extent::of(mesh.vertices.iter().copied()),
-        false => {
-            let used = mesh.triangles.iter().flatten();
-            Extent::of(used.map(|vertex| mesh.vertices[*vertex as usize]))
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use std::path::Path;
 
     use super::*;
+    use crate::geometry::Mesh;
     use crate::geometry::testing::{bumpy_sphere, random_places, tetrahedron};
 
     fn shape(name: &str, scale: f64, along: f64) -> Shape {

@@ -8,6 +8,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::formats::{Shape, ShapeError};
+use crate::geometry::Extent;
 
 /// The transform between the user's coordinates and the normalised ones; stored in checkpoints.
 #[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Debug)]
@@ -39,25 +40,11 @@ impl Normalisation {
     /// # Panics
     /// If there are no shapes.
     pub(crate) fn of_areas(shapes: &[&Shape], areas: &[f64]) -> Self {
-        assert!(!shapes.is_empty(), "a joint frame of no shapes");
-        let mut low = [f64::INFINITY; 3];
-        let mut high = [f64::NEG_INFINITY; 3];
-        let mut area = 0.0;
-        for (shape, own) in shapes.iter().zip(areas) {
-            area += own / shapes.len() as f64;
-            let mut include = |vertex: &[f64; 3]| {
-                for axis in 0..3 {
-                    low[axis] = low[axis].min(vertex[axis]);
-                    high[axis] = high[axis].max(vertex[axis]);
-                }
-            };
-            if shape.is_mesh() {
-                let used = shape.mesh.triangles.iter().flatten();
-                used.for_each(|&index| include(&shape.mesh.vertices[index as usize]));
-            } else {
-                shape.mesh.vertices.iter().for_each(include);
-            }
-        }
+        let boxes = shapes.iter().map(|shape| Extent::of_surface(&shape.mesh));
+        let Extent { low, high } = boxes
+            .reduce(|all, own| all.joined(&own))
+            .expect("a shape or more");
+        let area: f64 = areas.iter().map(|own| own / shapes.len() as f64).sum();
         let centre = [0, 1, 2].map(|axis| low[axis] + (high[axis] - low[axis]) / 2.0);
         Self {
             centre,
