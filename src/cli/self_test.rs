@@ -8,7 +8,7 @@ use isomorph::benchmark::self_test;
 use isomorph::recipe::RecipeError;
 use isomorph::{Backend, Recipe};
 
-use super::{Failure, Result, SetArgs, print};
+use super::{BackendArgs, Failure, Result, SetArgs, print};
 
 /// Compare a GPU with a processor: products, activations, sums and gradients in the shapes of a run
 ///
@@ -45,12 +45,12 @@ pub(super) struct SelfTestArgs {
 }
 
 pub(super) fn run(args: SelfTestArgs) -> Result {
-    let backend: Backend = args.backend.parse()?;
-    let backend = match &args.device {
-        Some(device) => backend.on(device)?,
-        None => backend,
-    };
     let recipe = recipe(&args).map_err(isomorph::Error::from)?;
+    let place = BackendArgs {
+        backend: args.backend,
+        device: args.device,
+    };
+    let backend = place.backend()?;
     let test = self_test(&backend, &recipe)?;
     match args.json {
         true => print(&(serde_json::to_string(&test)? + "\n"))?,

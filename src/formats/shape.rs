@@ -206,19 +206,19 @@ impl Shape {
     /// Says where 32-bit coordinates are too coarse for the shape, such as those of a map.
     fn with_note_on_precision(mut self) -> Self {
         let numbers = || self.mesh.vertices.iter().flatten().copied();
-        if are_rounded_to_32_bits(numbers()) {
-            let largest = numbers().fold(0.0_f64, |largest, x| largest.max(x.abs()));
-            // Between two numbers of 32 bits that are as large.
-            let step = largest * f64::from(f32::EPSILON);
-            let size = Extent::of(self.mesh.vertices.iter().copied()).diagonal();
-            if step > COARSE * size {
-                self.notes.push(format!(
-                    "{}: coordinates near {largest:.0} in 32 bits are {:.3} apart, {:.2} % of the shape's size, so finer detail is lost; export them relative to a place near the shape, or in 64 bits",
-                    self.path.display(),
-step,
-                    100.0 * step / size
-                ));
-            }
+        if !are_rounded_to_32_bits(numbers()) {
+            return self;
+        }
+        let largest = numbers().fold(0.0_f64, |largest, x| largest.max(x.abs()));
+        // Between two numbers of 32 bits that are as large.
+        let step = largest * f64::from(f32::EPSILON);
+        let share = step / Extent::of(self.mesh.vertices.iter().copied()).diagonal();
+        if share > COARSE {
+            let (path, percent) = (self.path.display(), 100.0 * share);
+            self.notes.push(format!(
+                "{path}: coordinates near {largest:.0} in 32 bits are {step:.3} apart, {percent:.2} % of the shape's \
+                 size, so finer detail is lost; export them relative to a place near the shape, or in 64 bits"
+            ));
         }
         self
     }

@@ -68,8 +68,7 @@ impl SelfTest {
 impl Checked {
     /// Whether it lies further off than allowed.
     pub fn is_wrong(&self) -> bool {
-        // Not a number is wrong too.
-        !matches!(self.off.partial_cmp(&self.allowed), Some(order) if order.is_le())
+        self.off.is_nan() || self.off > self.allowed
     }
 
     fn excess(&self) -> f64 {
@@ -182,11 +181,12 @@ fn deviation(found: &[Vec<f32>], wanted: &[Vec<f32>]) -> f64 {
         let off = length(&mut pairs.map(|(&a, &b)| f64::from(a) - f64::from(b)));
         off / own(wanted).max(LEAST_SHARE * whole)
     });
-    // A part that is not a number makes the whole so.
-    parts.fold(0.0, |worst: f64, off| match off.is_nan() {
-        true => f64::NAN,
-        false if worst.is_nan() => worst,
-        false => worst.max(off),
+    // A part that is not a number makes the whole so; the maximum of two numbers passes over it.
+    parts.fold(0.0, |worst: f64, off| {
+        match worst.is_nan() || off.is_nan() {
+            true => f64::NAN,
+            false => worst.max(off),
+        }
     })
 }
 
