@@ -16,7 +16,6 @@ import argparse
 import json
 import re
 import shlex
-import subprocess
 import sys
 import tempfile
 import time
@@ -24,6 +23,7 @@ from pathlib import Path
 
 from isomorph_paper import PaperError, command_line, compact, record
 from isomorph_paper.command_line import ROOT
+from isomorph_paper.runs import answer, output
 from isomorph_paper.sequences import write_atomically
 
 SIZES = ("quick", "default", "small", "shipped", "paper")
@@ -99,29 +99,6 @@ def measured(options: argparse.Namespace, command: str) -> dict:
     }
 
 
-def called(words: list[str]) -> str:
-    """What a command prints on standard output."""
-    print(f"$ {shlex.join(words)}", file=sys.stderr, flush=True)
-    try:
-        done = subprocess.run(words, capture_output=True, text=True)
-    except OSError as reason:
-        raise PaperError(f"{words[0]}: cannot be started ({reason.strerror})") from reason
-    if done.returncode:
-        raise PaperError(f"{shlex.join(words)}: failed: {done.stdout}{done.stderr.strip()}")
-    return done.stdout
-
-
-def answer(words: list[str]) -> dict:
-    """The JSON that a command prints."""
-    text = called(words)
-    try:
-        return json.loads(text)
-    except ValueError as reason:
-        raise PaperError(
-            f"{shlex.join(words)}: an answer that is not understood; does the binary fit these scripts?"
-        ) from reason
-
-
 def self_test(options: argparse.Namespace, preset: str) -> dict:
     return answer([options.binary, "self-test", "--json", "--preset", preset])
 
@@ -152,7 +129,7 @@ def train(options: argparse.Namespace, sample: str, backend: str) -> dict:
         if options.steps:
             words += ["--set", f"training.steps={options.steps}"]
         clock = time.monotonic()
-        called(words)
+        output(words)
         whole = time.monotonic() - clock
         try:
             last = json.loads((run / "metrics.jsonl").read_text().splitlines()[-1])

@@ -14,14 +14,13 @@ Needs numpy and matplotlib. Exit status: 0 done, 1 failed, 2 usage.
 """
 
 import argparse
-import json
 import shlex
-import subprocess
 import sys
 from pathlib import Path
 
 from isomorph_paper import PaperError, command_line, compact, figures, record
 from isomorph_paper.command_line import ROOT
+from isomorph_paper.runs import answer
 from isomorph_paper.sequences import write_atomically
 
 # What each is where another is varied.
@@ -103,15 +102,8 @@ def row(sweep: str, at: float, options: argparse.Namespace) -> dict:
     command += ["--repeats", str(options.repeats)]
     for name, value in {**BASE, sweep: at}.items():
         command += WORDS[name](value)
-    print(f"$ {shlex.join(command)}", file=sys.stderr, flush=True)
+    bench = answer(command)
     try:
-        done = subprocess.run(command, capture_output=True, text=True)
-    except OSError as reason:
-        raise PaperError(f"{command[0]}: cannot be started ({reason.strerror})") from reason
-    if done.returncode:
-        raise PaperError(f"{shlex.join(command)}: failed: {done.stderr.strip()}")
-    try:
-        bench = json.loads(done.stdout)
         stages = {stage["name"]: stage["seconds"] for stage in bench["stages"]}
         whole = bench["whole"]
         return {
@@ -122,7 +114,7 @@ def row(sweep: str, at: float, options: argparse.Namespace) -> dict:
             "peak_bytes": bench["peak_bytes"],
             "stages": [stages.get(name, 0.0) for name in STAGES],
         }
-    except (ValueError, KeyError, TypeError) as reason:
+    except (KeyError, TypeError) as reason:
         raise PaperError(
             f"isomorph bench: an answer that is not understood ({reason!r}); "
             "does the binary fit these scripts?"

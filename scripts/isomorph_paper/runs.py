@@ -153,6 +153,29 @@ def call_binary(words: list[str]) -> None:
         raise PaperError(f"{words[0]} compare: failed (status {status}); its message is above")
 
 
+def answer(words: list[str]) -> dict:
+    """The JSON that a command prints."""
+    try:
+        return json.loads(output(words))
+    except ValueError as reason:
+        raise PaperError(
+            f"{shlex.join(words)}: an answer that is not understood ({reason!r}); "
+            "does the binary fit these scripts?"
+        ) from reason
+
+
+def output(words: list[str]) -> str:
+    """What a command prints on standard output."""
+    print(f"$ {shlex.join(words)}", file=sys.stderr, flush=True)
+    try:
+        done = subprocess.run(words, capture_output=True, text=True)
+    except OSError as reason:
+        raise PaperError(f"{words[0]}: cannot be started ({reason.strerror})") from reason
+    if done.returncode:
+        raise PaperError(f"{shlex.join(words)}: failed: {done.stdout}{done.stderr.strip()}")
+    return done.stdout
+
+
 @dataclass(frozen=True)
 class Measured:
     """What was measured of one row on one pair."""
