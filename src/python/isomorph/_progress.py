@@ -5,33 +5,36 @@ from __future__ import annotations
 import json
 import sys
 from contextlib import contextmanager
+from functools import partial
+from importlib.util import find_spec
 from typing import Callable, Iterator
 
 
 @contextmanager
-def listener(on_event: Callable[[dict], object] | None, progress: bool | None) -> Iterator[Callable[[str], None] | None]:
-    """What the native part calls with each event, as JSON. progress: None shows a bar where tqdm is installed and
-    somebody looks."""
+def listener(
+    on_event: Callable[[dict], object] | None,
+    progress: bool | None,
+    also: Callable[[dict], object] | None = None,
+) -> Iterator[Callable[[str], None] | None]:
+    """What the native part calls with each event, as JSON. progress: None shows a bar where nobody listens, tqdm is
+    installed and somebody looks. also: a listener of this package, which leaves that as it is."""
+    if progress is None:
+        progress = on_event is None and watched() and find_spec("tqdm") is not None
     bar = None
-    if progress or (progress is None and on_event is None and watched()):
-        try:
-            from tqdm.auto import tqdm
-        except ImportError:
-            if progress:
-                raise
-        else:
-            bar = tqdm(unit="step", leave=False)
-    if bar is None and on_event is None:
+    if progress:
+        from tqdm.auto import tqdm
+
+        bar = tqdm(unit="step", leave=False)
+    listeners = [each for each in (also, on_event, bar and partial(follow, bar)) if each is not None]
+    if not listeners:
         # Without a listener nothing is encoded; Ctrl-C is seen all the same.
         yield None
         return
 
     def heard(text: str) -> None:
         event = json.loads(text)
-        if on_event is not None:
-            on_event(event)
-        if bar is not None:
-            follow(bar, event)
+        for each in listeners:
+            each(event)
 
     try:
         yield heard

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-import shutil
 import warnings
+from hashlib import sha256
 from pathlib import Path
 from typing import Any, Callable, Mapping
 
@@ -41,7 +41,7 @@ def morph(
     recipe, as in `{"training": {"steps": 2000}}` or `{"training.steps": 2000}`.
     """
     run = Path(run) if run else Path("runs") / f"{name_of(source, 'source')}-{name_of(target, 'target')}"
-    kept = Kept(run, overwrite)
+    kept = Kept(run)
     files = [kept.shape(source, "source"), kept.shape(target, "target")]
     text, assumed, doubts = _native.plan(*files, preset, kept.pairs(pairs), frames, changes(settings))
     notes = list(assumed)
@@ -116,16 +116,13 @@ def work(do: Callable, notes: list[str], on_event, progress) -> Run:
     """Does something, gathers what is noted on the way, and warns of what speaks against the result."""
     doubtful = []
 
-    def heard(event: dict) -> None:
+    def note(event: dict) -> None:
         if event["event"] == "note":
             notes.append(event["text"])
         elif event["event"] == "doubtful":
             doubtful.append(f"{event['finding']}; {event['cure']}")
-        if on_event is not None:
-            on_event(event)
 
-    shows = progress if progress is not None or on_event is None else False
-    with listener(heard, shows if shows is not None else wants_bar()) as listens:
+    with listener(on_event, progress, also=note) as listens:
         native = do(listens)
     for text in doubtful:
         notes.append(f"doubtful: {text}")
@@ -133,30 +130,21 @@ def work(do: Callable, notes: list[str], on_event, progress) -> Run:
     return Run(native, notes)
 
 
-def wants_bar() -> bool:
-    """Whether a bar is shown without being asked for."""
-    from importlib.util import find_spec
-
-    from ._progress import watched
-
-    return watched() and find_spec("tqdm") is not None
-
-
 class Kept:
-    """The files that a run needs of what is in memory: they lie in a folder beside it, named after it."""
+    """The files that a run needs of what is in memory: they lie in a folder beside it, named after it.
 
-    def __init__(self, run: Path, overwrite: bool):
+    Each is named after its content. So what an earlier run of the same folder was made of stays as it was, whatever
+    becomes of the new one.
+    """
+
+    def __init__(self, run: Path):
         self.folder = run.parent / f"{run.name}.shapes"
-        if self.folder.exists() and not overwrite and run.exists():
-            # The run says so itself, in the words of the command line.
-            return
-        shutil.rmtree(self.folder, ignore_errors=True)
 
     def shape(self, what: ShapeLike, name: str) -> str:
         if is_path(what):
             return os.fspath(what)
         shape = Shape.of(what)
-        path = self.place(f"{name}.ply")
+        path = self.place(name, ".ply", shape.vertices, shape.faces, shape.normals)
         shape.save(path)
         return str(path)
 
@@ -165,14 +153,17 @@ class Kept:
             return pairs
         if is_path(pairs):
             return os.fspath(pairs)
-        path = self.place("pairs.csv")
         numbers = indices("pairs", pairs, 1 << 32, columns=2)
+        path = self.place("pairs", ".csv", numbers)
         np.savetxt(path, numbers, fmt="%d", delimiter=",", header="source_index,target_index", comments="")
         return str(path)
 
-    def place(self, name: str) -> Path:
+    def place(self, name: str, ending: str, *arrays: np.ndarray | None) -> Path:
+        digest = sha256()
+        for array in arrays:
+            digest.update(b"" if array is None else str(array.shape).encode() + array.tobytes())
         self.folder.mkdir(parents=True, exist_ok=True)
-        return self.folder / name
+        return self.folder / f"{name}-{digest.hexdigest()[:12]}{ending}"
 
 
 def changes(settings: Mapping[str, Any] | None) -> list[str]:
@@ -210,6 +201,4 @@ def quoted(value: Any) -> str:
         return f'"{text}"'
     if isinstance(value, np.generic):
         value = value.item()
-    if isinstance(value, float):
-        return repr(value) if value == value and abs(value) != float("inf") else str(value).replace("-inf", "-inf")
     return word(value)

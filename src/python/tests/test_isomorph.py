@@ -154,6 +154,18 @@ def test_files_shapes_and_normals(place):
     assert np.sum(normals * vertices, axis=1).min() > 0.9
 
 
+def test_a_run_that_is_refused_leaves_the_shapes_of_the_one_that_is_there(place):
+    run = isomorph.morph(sphere(), sphere(0.5), run="run", frames=0, settings=SMALL | {"preset": "quick"})
+    before = {path.name: path.read_bytes() for path in (place / "run.shapes").iterdir()}
+    for overwrite, settings, why in ((False, {}, "exists already"), (True, {"training.stesp": 1}, "did you mean")):
+        with pytest.raises(ValueError, match=why):
+            isomorph.morph(sphere(3), sphere(4), run="run", overwrite=overwrite, settings=settings)
+    after = {path.name: path.read_bytes() for path in (place / "run.shapes").iterdir()}
+    assert before.items() <= after.items()
+    assert isomorph.resume("run", settings={"training.steps": 45}).metrics[-1]["step"] == 45
+    assert run.path == Path("run")
+
+
 def test_pairs_are_found_and_taken(place):
     # No symmetry: a bar with a thorn.
     vertices, faces = sphere(rings=16)
