@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use isomorph::{ExtractOptions, OutputFormat, Precision, SurfaceFormat, Trained, even_times};
+use isomorph::{ExtractOptions, OutputFormat, Precision, SurfaceFormat, Trained};
 
+use super::times::times_of;
 use super::{BackendArgs, Failure, ProgressArgs, Result, print, stop_on_interrupt};
 
 /// Write surfaces of a trained run, at any times and in any resolution
@@ -16,18 +17,20 @@ pub(super) struct ExtractArgs {
     /// Folder of the run
     run: PathBuf,
 
-    /// Number of surfaces, at even times from 0 to 1
+    /// Number of surfaces, at even times from the first shape to the last
     #[arg(long, value_name = "N", default_value_t = 9, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     frames: u32,
 
-    /// Times from 0 to 1, such as 0.25,0.5, instead of --frames
+    /// Times instead of --frames, such as 0.25,0.5: from 0 to 1, or in the unit of the recipe's key frames.
+    /// keys: those of all key frames
     #[arg(
         long,
         value_name = "A,B,C",
         value_delimiter = ',',
+        allow_hyphen_values = true,
         conflicts_with = "frames"
     )]
-    times: Vec<f64>,
+    times: Vec<String>,
 
     /// Grid cells along the longest side of the box, 8 to 2048 [default: result.resolution]
     #[arg(long, value_name = "R", value_parser = clap::value_parser!(u32).range(8..=2048))]
@@ -45,6 +48,10 @@ pub(super) struct ExtractArgs {
     /// coordinates are kept. Formats other than PLY and OBJ are written as PLY, geometry alone
     #[arg(long)]
     carry: bool,
+
+    /// With --carry: the key frame whose vertices are moved, counted from 0 (the source)
+    #[arg(long, value_name = "KEY", default_value_t = 0, requires = "carry")]
+    carry_from: usize,
 
     /// Also write animation.png, a moving picture of the surfaces (an animated PNG, which browsers play)
     #[arg(long)]
@@ -113,11 +120,7 @@ pub(super) fn run(args: ExtractArgs) -> Result {
     let trained = Trained::open(&args.run, args.place.backend()?)?;
     let defaults = ExtractOptions::of(trained.recipe());
     let options = ExtractOptions {
-        times: if args.times.is_empty() {
-            even_times(args.frames as usize)
-        } else {
-            args.times
-        },
+        times: times_of(&trained, &args.times, args.frames as usize)?,
         resolution: args
             .resolution
             .map_or(defaults.resolution, |cells| cells as usize),
@@ -126,6 +129,7 @@ pub(super) fn run(args: ExtractArgs) -> Result {
         trust: args.trust,
         layers: args.layers,
         carry: args.carry,
+        carry_from: args.carry_from,
         smallest_component: args
             .smallest_component
             .unwrap_or(defaults.smallest_component),

@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use isomorph::{Trained, even_times};
+use isomorph::Trained;
 
+use super::times::times_of;
 use super::{BackendArgs, Result, print};
 
 /// Write the distance field and the velocities on a grid, as an archive that numpy reads
@@ -20,18 +21,20 @@ pub(super) struct FieldArgs {
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(2..=2048))]
     grid: u32,
 
-    /// Number of times, even from 0 to 1
+    /// Number of times, even from the first shape to the last
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     frames: u32,
 
-    /// Times from 0 to 1, such as 0.25,0.5, instead of --frames
+    /// Times instead of --frames, such as 0.25,0.5: from 0 to 1, or in the unit of the recipe's key frames.
+    /// keys: those of all key frames
     #[arg(
         long,
         value_name = "A,B,C",
         value_delimiter = ',',
+        allow_hyphen_values = true,
         conflicts_with = "frames"
     )]
-    times: Vec<f64>,
+    times: Vec<String>,
 
     /// Output file
     #[arg(long, short, value_name = "FILE", default_value = "field.npz")]
@@ -43,10 +46,7 @@ pub(super) struct FieldArgs {
 
 pub(super) fn run(args: FieldArgs) -> Result {
     let trained = Trained::open(&args.run, args.place.backend()?)?;
-    let times = match args.times.is_empty() {
-        true => even_times(args.frames as usize),
-        false => args.times,
-    };
+    let times = times_of(&trained, &args.times, args.frames as usize)?;
     let found = trained.write_field(args.grid as usize, &times, &args.output, |_, _| {})?;
     let [nx, ny, nz] = found.nodes;
     let arrays = match found.has_velocity {

@@ -28,6 +28,7 @@ mod pick;
 mod resume;
 mod self_test;
 mod terminal;
+mod times;
 mod train;
 mod view;
 mod warp;

@@ -21,13 +21,13 @@ pub(super) struct WarpArgs {
     #[arg(long, value_name = "FILE")]
     points: PathBuf,
 
-    /// Time at which the points are where the file says, 0 (the source) to 1 (the target)
-    #[arg(long, value_name = "T", default_value_t = 0.0)]
-    from: f64,
+    /// Time at which the points are where the file says [default: that of the first shape, 0]
+    #[arg(long, value_name = "T", allow_hyphen_values = true)]
+    from: Option<f64>,
 
-    /// Time to which they are moved
-    #[arg(long, value_name = "T", default_value_t = 1.0)]
-    to: f64,
+    /// Time to which they are moved [default: that of the last shape, 1]
+    #[arg(long, value_name = "T", allow_hyphen_values = true)]
+    to: Option<f64>,
 
     /// Output file: .ply or .obj; or .xyz or .npy, which hold the points alone
     #[arg(long, short, value_name = "FILE")]
@@ -39,14 +39,15 @@ pub(super) struct WarpArgs {
 
 pub(super) fn run(args: WarpArgs) -> Result {
     let trained = Trained::open(&args.run, args.place.backend()?)?;
-    let times = [args.from, args.to];
-    let warped = trained.warp(&args.points, times, &args.output, |_| {})?;
+    let [first, last] = trained.span();
+    let (from, to) = (args.from.unwrap_or(first), args.to.unwrap_or(last));
+    let warped = trained.warp(&args.points, [from, to], &args.output, |_| {})?;
     let mut text = format!(
         "{}: {} points moved from time {} to {}, by {:.3} in the mean and {:.3} at most\n",
         args.output.display(),
         warped.points,
-        args.from,
-        args.to,
+        from,
+        to,
         warped.mean,
         warped.longest
     );

@@ -31,7 +31,7 @@ pub(crate) fn film(frames: &[Frame<'_>], view: &View, path: &Path) -> Result<(),
         .map(|frame| {
             let size = [camera.width, camera.height + LETTERS.val()];
             let mut picture = Canvas::new(size[0], size[1], WHITE);
-            place(&mut picture, &draw(frame, &camera), frame.time, &camera, 0);
+            place(&mut picture, &draw(frame, &camera), frame.named, &camera, 0);
             picture
         })
         .collect();
@@ -98,6 +98,7 @@ mod tests {
                 vertices,
                 triangles: &[[0, 1, 2]],
                 time,
+                named: f64::from(time),
             })
             .collect();
         let folder = tempfile::tempdir().expect("a temporary folder");

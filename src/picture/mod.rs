@@ -43,8 +43,10 @@ pub(crate) struct Frame<'a> {
     pub vertices: &'a [[f32; 3]],
     /// Vertex indices, counter-clockwise seen from outside.
     pub triangles: &'a [[u32; 3]],
-    /// Time in [0, 1]: the label, and the colour from blue over purple to orange.
+    /// Time in [0, 1]: the colour from blue over purple to orange.
     pub time: f32,
+    /// The time as the label has it.
+    pub named: f64,
 }
 
 /// A strip that cannot be drawn.
@@ -56,10 +58,10 @@ pub(crate) enum PictureError {
     /// A surface without vertices, with a coordinate that is not finite, an index out of range, or a
     /// time outside [0, 1].
     #[error(
-        "{0}: the surface at time {1} cannot be drawn: it needs a time from 0 to 1, vertices, all \
-         finite, and triangles that name them; extract it again"
+        "{0}: the surface at time {1} cannot be drawn: it needs vertices, all finite, and triangles that name them; \
+         extract it again"
     )]
-    Surface(String, f32),
+    Surface(String, f64),
     /// What the file system says; names the file.
     #[error(transparent)]
     Io(#[from] io::Error),
@@ -83,7 +85,7 @@ pub(crate) fn strip(frames: &[Frame<'_>], view: &View, path: &Path) -> Result<()
         place(
             &mut picture,
             pixels,
-            frame.time,
+            frame.named,
             &camera,
             number * camera.width,
         );
@@ -93,13 +95,22 @@ pub(crate) fn strip(frames: &[Frame<'_>], view: &View, path: &Path) -> Result<()
 }
 
 /// Puts a surface that was drawn into a picture, from column `left` on, with its time below.
-fn place(picture: &mut Canvas, pixels: &[[u8; 3]], time: f32, camera: &Camera, left: usize) {
+fn place(picture: &mut Canvas, pixels: &[[u8; 3]], time: f64, camera: &Camera, left: usize) {
     for (place, &pixel) in pixels.iter().enumerate() {
         let (x, y) = (left + place % camera.width, place / camera.width);
         picture.put(x, y, pixel);
     }
-    let label = format!("t = {time:.2}");
+    let label = format!("t = {}", short(time));
     write(picture, &label, left + camera.width / 2, camera.height);
+}
+
+/// A time in at most five letters, where that is possible.
+fn short(time: f64) -> String {
+    match time.abs() {
+        0.0..10.0 => format!("{time:.2}"),
+        10.0..1000.0 => format!("{time:.1}"),
+        _ => format!("{time:.0}"),
+    }
 }
 
 fn check(frames: &[Frame<'_>], view: &View, path: &Path) -> Result<(), PictureError> {
@@ -117,7 +128,7 @@ fn check(frames: &[Frame<'_>], view: &View, path: &Path) -> Result<(), PictureEr
             && indices.all(|&vertex| (vertex as usize) < count)
     };
     match frames.iter().find(|frame| !is_drawable(frame)) {
-        Some(frame) => Err(PictureError::Surface(path, frame.time)),
+        Some(frame) => Err(PictureError::Surface(path, frame.named)),
         None => Ok(()),
     }
 }
@@ -188,12 +199,13 @@ mod tests {
     }
 
     fn drawn(balls: &[Ball]) -> Canvas {
-        let frames: Vec<Frame<'_>> = (0..)
+        let frames: Vec<Frame<'_>> = (0u32..)
             .zip(balls)
             .map(|(number, (vertices, triangles))| Frame {
                 vertices,
                 triangles,
                 time: number as f32,
+                named: f64::from(number),
             })
             .collect();
         let folder = tempfile::tempdir().expect("a temporary folder");
@@ -247,6 +259,7 @@ mod tests {
                 vertices,
                 triangles,
                 time: 0.5,
+                named: 0.5,
             };
             let view = View { height, ..FRONT };
             let error = strip(&vec![frame; count], &view, &path).expect_err("no picture");

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use isomorph::{
-    Backend, ExtractOptions, OutputFormat, Precision, StopFlag, Trained, current_report, even_times,
+    Backend, ExtractOptions, OutputFormat, Precision, StopFlag, Trained, current_report,
 };
 use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::exceptions::PyOSError;
@@ -130,7 +130,7 @@ impl Run {
             true => Precision::Compact,
             false => Precision::Full,
         });
-        options.times = even_times(frames);
+        options.times = self.0.even_times(frames);
         options.resolution = resolution.unwrap_or(options.resolution);
         options.carry = true;
         options.folder = Some(folder);

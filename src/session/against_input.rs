@@ -3,10 +3,11 @@
 //! All lengths are in normalised units. The limits are those that no run of the samples and of the evaluation
 //! protocol comes near; a result beyond them is not what was asked for, whatever its cause.
 
+use super::clock::Clock;
 use crate::event::Event;
 use crate::geometry::density::usual_spacing;
 use crate::geometry::{Mesh, NeighbourSearch, TriangleSearch};
-use crate::shape::Keyframe;
+use crate::shape::{Keyframe, key_name};
 use crate::surface::frames::Frame;
 use crate::surface::learned::Learned;
 
@@ -43,8 +44,10 @@ const PIECE: f64 = 0.01;
 
 /// A shape as it was given, for comparison with the surface at its time.
 pub(super) struct End {
-    name: &'static str,
+    name: String,
     time: f64,
+    /// The time as the user counts.
+    own_time: f64,
     points: Vec<[f32; 3]>,
     mesh: Option<Mesh<f32>>,
     /// Whether each point lies at the border of what is known; empty where nothing is missing.
@@ -52,37 +55,36 @@ pub(super) struct End {
 }
 
 impl End {
-    /// The first and the last of the shapes.
-    pub(super) fn both(keys: &[Keyframe]) -> [Self; 2] {
-        let end = |name, key: &Keyframe| Self {
-            name,
+    /// All shapes of a run.
+    pub(super) fn all(keys: &[Keyframe], clock: Clock) -> Vec<Self> {
+        let count = keys.len();
+        let end = |(k, key): (usize, &Keyframe)| Self {
+            name: key_name(k, count),
             time: key.time,
+            own_time: clock.own(key.time),
             points: key.cloud.points.clone(),
             mesh: key.mesh.clone(),
             border: key.border.clone(),
         };
-        [
-            end("source", &keys[0]),
-            end("target", &keys[keys.len() - 1]),
-        ]
+        keys.iter().enumerate().map(end).collect()
     }
 
     /// What of this end's surface contradicts it; nothing if no surface is of its time.
     pub(super) fn contradicted(&self, frames: &[Frame]) -> Vec<Event> {
-        let own = frames.iter().find(|frame| frame.entry.time == self.time);
+        let own = frames.iter().find(|frame| frame.time == self.time);
         let Some(frame) = own else {
             return Vec::new();
         };
         let said = self.findings(&frame.mesh);
         let doubtful = |(finding, cure): (String, &str)| Event::Doubtful {
-            finding: format!("the surface at {} {finding}", self.time),
+            finding: format!("the surface at {} {finding}", self.own_time),
             cure: cure.to_owned(),
         };
         said.into_iter().map(doubtful).collect()
     }
 
     fn findings(&self, surface: &Mesh<f32>) -> Vec<(String, &'static str)> {
-        let name = self.name;
+        let name = &self.name[..];
         let Some(search) = TriangleSearch::new(surface) else {
             return vec![("is empty".to_owned(), LONGER)];
         };
@@ -134,7 +136,7 @@ impl End {
             self.border[near.index as usize] && near.squared_distance.sqrt() > FREE * spacing
         };
         let share = arrived.iter().filter(is_free).count() as f64 / arrived.len() as f64;
-        let (own, of) = (self.name, other.name);
+        let (own, of) = (&self.name, &other.name);
         (share > LEAST_SHARE).then(|| {
             Event::Note(format!(
                 "{:.0} % of the {of} has no counterpart in the {own}: there the motion is a guess from what is near by",
@@ -244,8 +246,9 @@ mod tests {
     fn end(mesh: &Mesh<f64>, closed: bool) -> End {
         let mesh = narrow(mesh);
         End {
-            name: "source",
+            name: "source".to_owned(),
             time: 0.0,
+            own_time: 0.0,
             points: mesh.vertices.clone(),
             mesh: closed.then_some(mesh),
             border: Vec::new(),

@@ -12,7 +12,7 @@ use std::path::PathBuf;
 use isomorph_training::engine::Engine;
 use isomorph_training::method::METHODS;
 
-use super::compared::{Made, make, stored_pairs};
+use super::compared::{Made, make, stored};
 use super::evaluate::{EvaluateOptions, true_frame};
 use super::learned;
 use super::measure::Ruler;
@@ -251,9 +251,9 @@ impl Bench<'_> {
         on_event: &mut dyn FnMut(&Event),
     ) -> Result<Made> {
         let run = self.folder(pair).join(compare::file_stem(&method.label));
-        let stored = stored_pairs(&run, recipe);
+        let stored = stored(&run, recipe);
         let shapes = prepare::read(recipe)?;
-        let prepared = prepare::prepare(recipe, &shapes, stored.as_deref(), on_event)?;
+        let prepared = prepare::prepare(recipe, &shapes, stored.as_ref(), on_event)?;
         let keyframes = &prepared.keyframes;
         let name = format!("method {}", method.label);
         learned::check(recipe, &keyframes.normalisation).map_err(|error| error.within(&name))?;

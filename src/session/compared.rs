@@ -1,6 +1,6 @@
 //! One method on one pair of a comparison: trained, or its training gone on with, and measured.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Instant;
 
 use isomorph_training::engine::Engine;
@@ -19,10 +19,10 @@ use crate::evaluate::Evaluation;
 use crate::event::Event;
 use crate::recipe::Recipe;
 
-/// The pairs that a run made with this recipe has found, if it is there to be gone on with.
-pub(super) fn stored_pairs(path: &Path, recipe: &Recipe) -> Option<PathBuf> {
+/// A run made with this recipe, if it is there to be gone on with.
+pub(super) fn stored(path: &Path, recipe: &Recipe) -> Option<RunFolder> {
     let run = RunFolder::open(path).ok()?;
-    is_of(&run, recipe).then(|| run.pairs())
+    is_of(&run, recipe).then_some(run)
 }
 
 fn is_of(run: &RunFolder, recipe: &Recipe) -> bool {
@@ -76,7 +76,7 @@ pub(super) fn make(
     let step = checkpoint.as_ref().map(|found| found.state.step);
     let mut log = RunLog::open(run.path(), step)?;
     let keyframes = &prepared.keyframes;
-    if let Some(matched) = prepared.keep(&run)? {
+    for matched in prepared.keep(&run)? {
         on_event(&matched);
         log.record(&matched)?;
     }

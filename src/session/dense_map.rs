@@ -56,12 +56,13 @@ impl Trained {
             move |vertex: u32| shape.number_in_file(vertex)
         });
         let search = NeighbourSearch::new(target);
-        let arrived = self.carry(source, 0.0, 1.0)?;
+        let [first, last] = self.span();
+        let arrived = self.carry(source, first, last)?;
         let found = search.nearest_one_of_each(&arrived);
         let goals: Vec<[f64; 3]> = (found.iter())
             .map(|near| target[near.index as usize])
             .collect();
-        let back = self.carry(&goals, 1.0, 0.0)?;
+        let back = self.carry(&goals, last, first)?;
         let two = std::num::NonZeroUsize::MIN.saturating_add(1);
         let spacing = search.nearest_of_each(&goals, two);
         let halves = self.learned().normalisation.invert_length(HALVES);

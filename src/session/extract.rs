@@ -3,20 +3,24 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use tempfile::TempDir;
+
+use super::clock::Clock;
 use super::log::RunLog;
+use super::prepare;
 use super::stop::StopFlag;
-use super::trained::{Trained, check_time};
+use super::trained::Trained;
 use crate::error::{Error, Result};
 use crate::event::Event;
 use crate::formats::SurfaceFormat;
 use crate::picture;
 use crate::recipe::Recipe;
-use crate::surface::frames::{Frame, FrameOptions, OutputFormat, write_frames};
+use crate::surface::frames::{CarriedSource, Frame, FrameOptions, OutputFormat, write_frames};
 
 /// What to write.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExtractOptions {
-    /// The times, 0 (the first shape) to 1 (the last).
+    /// The times, from that of the first shape to that of the last ([`Trained::span`]).
     pub times: Vec<f64>,
     /// Cells of the grid along the longest side of the box.
     pub resolution: usize,
@@ -34,6 +38,8 @@ pub struct ExtractOptions {
     pub layers: Vec<f64>,
     /// Whether the source's own vertices are carried along as well.
     pub carry: bool,
+    /// The key frame whose vertices are carried, counted from 0; the source is the first.
+    pub carry_from: usize,
     /// Pieces with less than this share of a surface's area are left out.
     pub smallest_component: f64,
     /// Where the files go; the run's own `meshes` folder without it.
@@ -44,13 +50,14 @@ impl ExtractOptions {
     /// What the recipe asks for at the end of training.
     pub fn of(recipe: &Recipe) -> Self {
         Self {
-            times: even_times(recipe.result.frames),
+            times: result_times(recipe),
             resolution: recipe.result.resolution,
             format: OutputFormat::Frames(SurfaceFormat::Ply),
             film: false,
             trust: false,
             layers: Vec::new(),
             carry: false,
+            carry_from: 0,
             smallest_component: recipe.result.smallest_component,
             folder: None,
         }
@@ -58,7 +65,6 @@ impl ExtractOptions {
 
     /// Refuses what no extraction can be.
     fn check(&self) -> Result<()> {
-        self.times.iter().try_for_each(|time| check_time(*time))?;
         if !(0.0..=1.0).contains(&self.smallest_component) {
             return Err(Error::usage(format!(
                 "smallest component {}: must be 0 to 1 (0 keeps every piece)",
@@ -81,6 +87,25 @@ impl ExtractOptions {
         }
         Ok(())
     }
+}
+
+/// The most key frames whose surfaces all belong to the result.
+const SHOWN_KEYS: usize = 32;
+
+/// The times of the result: `result.frames` even ones, and those of the key frames where there are more than two.
+fn result_times(recipe: &Recipe) -> Vec<f64> {
+    let clock = Clock::of(recipe);
+    let units = even_times(recipe.result.frames).into_iter();
+    let mut times: Vec<f64> = units.map(|unit| clock.own(unit)).collect();
+    let keys = &recipe.data.keyframes;
+    if (3..=SHOWN_KEYS).contains(&keys.len()) && !times.is_empty() {
+        // A key frame takes the place of an even time that is nearly the same.
+        let near = 0.01 * clock.length();
+        times.retain(|time| keys.iter().all(|key| (key.time - time).abs() > near));
+        times.extend(keys.iter().map(|key| key.time));
+        times.sort_by(f64::total_cmp);
+    }
+    times
 }
 
 /// Evenly spaced times from 0 to 1.
@@ -118,6 +143,29 @@ impl Trained {
         folder.unwrap_or_else(|| self.folder().meshes())
     }
 
+    /// The file of a key frame, whose vertices are carried; a frame of a sequence is written as a file into `held`.
+    fn carried_key(&self, k: usize, held: &mut Option<TempDir>) -> Result<CarriedSource> {
+        let keys = &self.recipe().data.keyframes;
+        let key = keys.get(k).ok_or_else(|| {
+            Error::usage(format!(
+                "key frame {k}: the run has {}, counted from 0",
+                keys.len()
+            ))
+        })?;
+        let file = match key.frame {
+            None => key.file.clone(),
+            Some(frame) => {
+                let stem = key.file.file_stem().unwrap_or_default().to_string_lossy();
+                let folder = held.insert(tempfile::tempdir()?);
+                let file = folder.path().join(format!("{stem}-{frame}.ply"));
+                prepare::shape_of(key, &mut None)?.write(&file)?;
+                file
+            }
+        };
+        let time = self.clock().unit(key.time)?;
+        Ok(CarriedSource { file, time })
+    }
+
     /// Writes surfaces and returns them.
     pub(super) fn extract_into(
         &self,
@@ -127,15 +175,27 @@ impl Trained {
         on_event: &mut dyn FnMut(&Event),
     ) -> Result<Vec<Frame>> {
         options.check()?;
+        let clock = self.clock();
+        let times: Result<Vec<f64>> = options.times.iter().map(|t| clock.unit(*t)).collect();
+        // Where a frame of a sequence stands as a file while it is carried.
+        let mut held = None;
         let frame_options = FrameOptions {
-            times: options.times.clone(),
+            times: times?,
+            names: options.times.clone(),
+            keys: match self.key_times() {
+                keys if keys.len() > 2 => {
+                    keys.iter().map(|t| clock.unit(*t)).collect::<Result<_>>()?
+                }
+                _ => Vec::new(),
+            },
             resolution: options.resolution,
             format: options.format,
             trust: options.trust,
             layers: options.layers.clone(),
-            carry: options
-                .carry
-                .then(|| self.recipe().data.source().to_owned()),
+            carry: match options.carry {
+                true => Some(self.carried_key(options.carry_from, &mut held)?),
+                false => None,
+            },
             smallest_component: options.smallest_component,
             folder: self.output(options),
         };
@@ -188,7 +248,8 @@ fn drawn(frame: &Frame) -> picture::Frame<'_> {
     picture::Frame {
         vertices: &frame.mesh.vertices,
         triangles: &frame.mesh.triangles,
-        time: frame.entry.time as f32,
+        time: frame.time as f32,
+        named: frame.entry.time,
     }
 }
 

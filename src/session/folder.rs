@@ -149,9 +149,12 @@ impl RunFolder {
         self.0.join("recipe.toml")
     }
 
-    /// The pairs that were found by matching.
-    pub(crate) fn pairs(&self) -> PathBuf {
-        self.0.join("pairs.csv")
+    /// The pairs that were found by matching, from key frame `k` to the next, of so many intervals.
+    pub(crate) fn pairs(&self, k: usize, intervals: usize) -> PathBuf {
+        self.0.join(match intervals {
+            1 => PAIRS.to_owned(),
+            _ => format!("{PAIRS_OF_INTERVAL}{k:04}.csv"),
+        })
     }
 
     /// The folder of checkpoints.
@@ -176,9 +179,15 @@ impl RunFolder {
                 fs::remove_dir_all(folder)?;
             }
         }
-        let files = ["metrics.jsonl", "run.log", "pairs.csv", "report.html"];
+        let mut files = ["metrics.jsonl", "run.log", PAIRS, "report.html"]
+            .map(str::to_owned)
+            .to_vec();
+        let names = fs::read_dir(&self.0)?.flatten();
+        let names = names.filter_map(|entry| entry.file_name().into_string().ok());
+        files.extend(names.filter(|name| is_pairs_of_interval(name)));
         // The recipe last: without it this is no run that another try may replace.
-        for file in files.into_iter().chain(["recipe.toml"]) {
+        files.push("recipe.toml".to_owned());
+        for file in files {
             match fs::remove_file(self.0.join(file)) {
                 Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
                 _ => {}
@@ -186,6 +195,18 @@ impl RunFolder {
         }
         Ok(())
     }
+}
+
+/// The file of pairs between two shapes.
+const PAIRS: &str = "pairs.csv";
+
+/// What the names of the files of pairs begin with where there are more than two shapes.
+const PAIRS_OF_INTERVAL: &str = "pairs-";
+
+fn is_pairs_of_interval(name: &str) -> bool {
+    let number = name.strip_prefix(PAIRS_OF_INTERVAL);
+    let number = number.and_then(|rest| rest.strip_suffix(".csv"));
+    number.is_some_and(|number| number.len() >= 4 && number.bytes().all(|c| c.is_ascii_digit()))
 }
 
 /// Whether a folder holds anything but what a run leaves that was killed before it had written its recipe,

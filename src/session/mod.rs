@@ -28,6 +28,7 @@ mod against_input;
 pub(crate) mod bench;
 pub(crate) mod bench_run;
 pub(crate) mod checkpoint;
+mod clock;
 pub(crate) mod compare;
 mod compared;
 pub(crate) mod dense_map;

@@ -1,12 +1,13 @@
 //! The shapes of a recipe made ready, their pairs found first where the recipe asks for it.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use isomorph_training::method::spline::is_solved;
 
 use crate::error::Result;
 use crate::event::{Event, Preparation};
-use crate::formats::{self, Shape};
+use crate::formats::{self, Sequence, Shape};
 use crate::matching::{MatchOptions, Matching, match_shapes};
 use crate::recipe::{self, Recipe};
 use crate::session::folder::RunFolder;
@@ -17,8 +18,9 @@ use crate::shape::{
 /// Shapes ready for training.
 pub(super) struct Prepared {
     pub keyframes: Keyframes,
-    /// What matching found just now, which the run does not hold yet.
-    found: Option<Matching>,
+    /// What matching found just now, which the run does not hold yet, by the interval.
+    found: BTreeMap<usize, Matching>,
+    intervals: usize,
 }
 
 /// Reads the shapes of a recipe, cleaned as it says.
@@ -31,14 +33,38 @@ pub(super) fn read(recipe: &Recipe) -> Result<Vec<Shape>> {
         strays: section.clean_strays,
         part: section.clean_part,
     });
-    let cleaned = |key: &recipe::KeyframeRecipe| {
-        let shape = formats::read(&key.file)?;
-        Ok(match &cleaning {
+    // Read once, however many of its frames are key frames.
+    let mut sequence: Option<Sequence> = None;
+    let mut shapes = Vec::with_capacity(section.keyframes.len());
+    for key in &section.keyframes {
+        let shape = shape_of(key, &mut sequence)?;
+        shapes.push(match &cleaning {
             Some(options) => shape.cleaned(options),
             None => shape,
-        })
+        });
+    }
+    Ok(shapes)
+}
+
+/// The shape of a key frame, as its file has it.
+///
+/// # Errors
+/// What [`formats::read`] and [`Sequence`] refuse.
+pub(super) fn shape_of(
+    key: &recipe::KeyframeRecipe,
+    sequence: &mut Option<Sequence>,
+) -> Result<Shape> {
+    let Some(frame) = key.frame else {
+        return Ok(formats::read(&key.file)?);
     };
-    section.keyframes.iter().map(cleaned).collect()
+    let read = match sequence.take() {
+        Some(read) if read.path == key.file => read,
+        _ => Sequence::read(&key.file)?,
+    };
+    let mut shape = sequence.insert(read).shape(frame)?;
+    // Messages name the frame.
+    shape.path = format!("{} frame {frame}", key.file.display()).into();
+    Ok(shape)
 }
 
 /// Makes the shapes of a recipe ready. Pairs that are to be found are read from `stored` if that
@@ -49,19 +75,22 @@ pub(super) fn read(recipe: &Recipe) -> Result<Vec<Shape>> {
 pub(super) fn prepare(
     recipe: &Recipe,
     shapes: &[Shape],
-    stored: Option<&Path>,
+    stored: Option<&RunFolder>,
     emit: &mut dyn FnMut(&Event),
 ) -> Result<Prepared> {
-    let mut between = Vec::with_capacity(recipe.data.between.len());
-    let mut found = None;
-    for (known, shapes) in recipe.data.between.iter().zip(shapes.windows(2)) {
+    let intervals = recipe.data.between.len();
+    let mut between = Vec::with_capacity(intervals);
+    let mut found = BTreeMap::new();
+    let known = recipe.data.between.iter().zip(shapes.windows(2));
+    for (k, (known, shapes)) in known.enumerate() {
         between.push(match known {
             recipe::Correspondences::None => CorrespondenceSource::None,
             recipe::Correspondences::SameVertices => CorrespondenceSource::SameVertices,
             recipe::Correspondences::File(path) => CorrespondenceSource::File(path.clone()),
             recipe::Correspondences::Match => {
-                let (known, matching) = matched(recipe, shapes, stored, emit)?;
-                found = matching;
+                let stored = stored.map(|run| run.pairs(k, intervals));
+                let (known, matching) = matched(recipe, shapes, stored.as_deref(), emit)?;
+                found.extend(matching.map(|matching| (k, matching)));
                 CorrespondenceSource::Pairs(known)
             }
         });
@@ -71,7 +100,11 @@ pub(super) fn prepare(
     if is_solved(recipe) {
         emit(&Event::Preparing(Preparation::Distances));
     }
-    Ok(Prepared { keyframes, found })
+    Ok(Prepared {
+        keyframes,
+        found,
+        intervals,
+    })
 }
 
 /// The pairs of two shapes: those of an earlier search if they are there, else found now.
@@ -160,17 +193,18 @@ impl Prepared {
     ///
     /// # Errors
     /// What the file system says; the message names the file.
-    pub(super) fn keep(&self, run: &RunFolder) -> std::io::Result<Option<Event>> {
-        let Some(found) = &self.found else {
-            return Ok(None);
-        };
-        found.write_csv(&run.pairs())?;
-        let (coverage, cycle) = (&found.coverage, &found.cycle.source);
-        Ok(Some(Event::Matched {
-            pairs: found.pairs.len(),
-            coverage: [coverage.source, coverage.target],
-            cycle: [cycle.median, cycle.quantile_95],
-            seconds: found.seconds,
-        }))
+    pub(super) fn keep(&self, run: &RunFolder) -> std::io::Result<Vec<Event>> {
+        let mut events = Vec::with_capacity(self.found.len());
+        for (k, found) in &self.found {
+            found.write_csv(&run.pairs(*k, self.intervals))?;
+            let (coverage, cycle) = (&found.coverage, &found.cycle.source);
+            events.push(Event::Matched {
+                pairs: found.pairs.len(),
+                coverage: [coverage.source, coverage.target],
+                cycle: [cycle.median, cycle.quantile_95],
+                seconds: found.seconds,
+            });
+        }
+        Ok(events)
     }
 }

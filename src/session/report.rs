@@ -112,6 +112,7 @@ impl Trained {
             let shape = formats::read(&folder.join(&entry.surface)).ok()?;
             let mesh = shape.mesh.moved(|x| self.learned().normalisation.apply(x));
             Some(Frame {
+                time: self.clock().unit(entry.time).ok()?,
                 entry,
                 components: mesh.components().len(),
                 mesh,
@@ -125,7 +126,7 @@ impl Trained {
 
     /// Surfaces on a coarse grid.
     fn coarse(&self) -> Result<Vec<Frame>> {
-        let (learned, result) = (self.learned(), &self.recipe().result);
+        let (learned, result, clock) = (self.learned(), &self.recipe().result, self.clock());
         let grid = Grid::new(
             learned.bounds.min,
             learned.bounds.max,
@@ -135,7 +136,9 @@ impl Trained {
         let frame = |time: f64| -> Result<Frame> {
             let found = learned.surface_at(&grid, time, result.smallest_component, &mut |_| ())?;
             let (_, slope_error) = learned.normals(&found.mesh, time);
-            Ok(Frame::measured(learned, found, time, slope_error)?)
+            let mut frame = Frame::measured(learned, found, time, slope_error)?;
+            frame.entry.time = clock.own(time);
+            Ok(frame)
         };
         times.into_iter().map(frame).collect()
     }

@@ -73,7 +73,7 @@ impl<'a> ReportData<'a> {
             thinned: Vec::new(),
         };
         data.add_ends()?;
-        frames.sort_by(|a, b| a.entry.time.total_cmp(&b.entry.time));
+        frames.sort_by(|a, b| a.time.total_cmp(&b.time));
         data.add_surfaces(&frames, truth)?;
         data.add_pairs();
         Ok(data)
@@ -129,7 +129,7 @@ impl<'a> ReportData<'a> {
     fn add_surfaces(&mut self, frames: &[Frame], truth: Option<&TrueShapes>) -> Result<()> {
         for frame in frames {
             self.quality.push(Quality {
-                time: frame.entry.time,
+                time: frame.time,
                 triangles: frame.mesh.triangles.len(),
                 components: Some(frame.components),
                 consistency: frame.entry.consistency,
@@ -141,7 +141,7 @@ impl<'a> ReportData<'a> {
         let filled: Vec<usize> = (0..frames.len())
             .filter(|k| !frames[*k].mesh.triangles.is_empty())
             .collect();
-        let times: Vec<f64> = filled.iter().map(|k| frames[*k].entry.time).collect();
+        let times: Vec<f64> = filled.iter().map(|k| frames[*k].time).collect();
         let spans: Vec<Vec<f64>> = (0..times.len())
             .map(|k| times_around(&times, k, self.moves()))
             .collect();
@@ -151,7 +151,7 @@ impl<'a> ReportData<'a> {
         let most = (SURFACE_BYTES / for_a_vertex.max(1)).clamp(fewest, most);
         let mut largest = 0;
         for (k, times) in filled.into_iter().zip(spans) {
-            let (mesh, time) = (&frames[k].mesh, frames[k].entry.time);
+            let (mesh, time) = (&frames[k].mesh, frames[k].time);
             largest = largest.max(mesh.vertices.len());
             let thin = thinned(mesh, most);
             let points: Vec<[f32; 3]> = (thin.chosen.iter())
@@ -224,19 +224,22 @@ impl<'a> ReportData<'a> {
 
     /// Pairs of the source and the target; a file that cannot be read is noted.
     fn add_pairs(&mut self) {
-        let (source, target) = (&self.shapes[0], &self.shapes[self.shapes.len() - 1]);
-        let found = match self.trained.recipe().data.between.first() {
-            Some(recipe::Correspondences::File(path)) => {
+        // Between the first and the last of many shapes none are given.
+        let [source, target] = &self.shapes[..] else {
+            return;
+        };
+        let found = match &self.trained.recipe().data.between[0] {
+            recipe::Correspondences::File(path) => {
                 Some(Correspondences::read(path, source, target))
             }
-            Some(recipe::Correspondences::Match) => {
-                let path = self.trained.folder().pairs();
+            recipe::Correspondences::Match => {
+                let path = self.trained.folder().pairs(0, 1);
                 Some(Correspondences::read(&path, source, target))
             }
-            Some(recipe::Correspondences::SameVertices) => {
+            recipe::Correspondences::SameVertices => {
                 Some(Correspondences::same_vertices(source, target))
             }
-            Some(recipe::Correspondences::None) | None => None,
+            recipe::Correspondences::None => None,
         };
         match found {
             Some(Ok(known)) => {

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use zip::write::{SimpleFileOptions, ZipWriter};
 
-use super::trained::{Trained, check_time};
+use super::trained::Trained;
 use crate::atomic::write_atomically;
 use crate::error::{Error, Result};
 
@@ -51,7 +51,9 @@ impl Trained {
         path: &Path,
         mut progress: impl FnMut(usize, usize),
     ) -> Result<FieldGrid> {
-        times.iter().try_for_each(|time| check_time(*time))?;
+        let clock = self.clock();
+        let units: Result<Vec<f64>> = times.iter().map(|t| clock.unit(*t)).collect();
+        let units = units?;
         let learned = self.learned();
         let field = learned.deformation.field().ok_or_else(|| {
             let text = "this method has no distance field; it carries the source's mesh";
@@ -73,7 +75,7 @@ impl Trained {
         let mut done = 0;
         let own = |value: f32| learned.normalisation.invert_length(f64::from(value)) as f32;
         let mut each = |out: &mut dyn Write, values: &Values<'_>| {
-            for &time in times {
+            for &time in &units {
                 for chunk in places.chunks(AT_A_TIME) {
                     let found = values(chunk, time).into_iter().map(own);
                     let bytes: Vec<u8> = found.flat_map(f32::to_le_bytes).collect();
@@ -103,7 +105,10 @@ impl Trained {
                     &[times.len(), nx, ny, nz, 3],
                 )?;
                 each(&mut archive, &|points, time| {
-                    motion.velocities(points, time).into_flattened()
+                    let mut found = motion.velocities(points, time).into_flattened();
+                    let length = clock.length() as f32;
+                    found.iter_mut().for_each(|part| *part /= length);
+                    found
                 })?;
             }
             archive.finish()?;

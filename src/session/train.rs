@@ -6,6 +6,7 @@ use isomorph_training::engine::{Engine, Trainer};
 
 use super::against_input::End;
 use super::checkpoint::{self, Checkpoint, CheckpointError};
+use super::clock::Clock;
 use super::folder::RunFolder;
 use super::learned::{self, Frame};
 use super::learner::{self, Learner, LearnerError, Outcome};
@@ -240,13 +241,16 @@ impl Session {
                 ..ExtractOptions::of(&self.recipe)
             };
             let frames = trained.extract_into(&options, &self.stop, log, on_event)?;
-            let [first, last] = &begun.ends;
-            let unsupported = [
-                last.unsupported(first, trained.learned()),
-                first.unsupported(last, trained.learned()),
-            ];
+            let learned = trained.learned();
+            let unsupported = begun.ends.windows(2).flat_map(|two| {
+                let [first, last] = [&two[0], &two[1]];
+                [
+                    last.unsupported(first, learned),
+                    first.unsupported(last, learned),
+                ]
+            });
             let said = begun.ends.iter().flat_map(|end| end.contradicted(&frames));
-            for event in unsupported.into_iter().flatten().chain(said) {
+            for event in unsupported.flatten().chain(said) {
                 on_event(&event);
                 log.record(&event)?;
             }
@@ -326,7 +330,8 @@ impl Session {
             on_event(&event);
             log.record(&event)?;
         }
-        Ok(Begun::new(run, lock, log, learner, &prepared))
+        let clock = Clock::of(&self.recipe);
+        Ok(Begun::new(run, lock, log, learner, &prepared, clock))
     }
 
     /// A run where its newest checkpoint left it: what is refused leaves it as it was.
@@ -341,8 +346,7 @@ impl Session {
         };
         let run = RunFolder::open(&self.folder)?;
         let lock = run.lock()?;
-        let pairs = run.pairs();
-        let prepared = prepare::prepare(&self.recipe, &self.shapes, Some(&pairs), on_event)?;
+        let prepared = prepare::prepare(&self.recipe, &self.shapes, Some(&run), on_event)?;
         let keyframes = &prepared.keyframes;
         let changes = match checkpoint {
             Some(checkpoint) => {
@@ -359,7 +363,7 @@ impl Session {
         // Nothing is written before here.
         let step = checkpoint.as_ref().map_or(0, |found| found.state.step);
         let mut log = RunLog::open(run.path(), Some(step))?;
-        let mut events: Vec<Event> = prepared.keep(&run)?.into_iter().collect();
+        let mut events: Vec<Event> = prepared.keep(&run)?;
         events.extend(lock.note().map(Event::Note));
         events.extend(notes.iter().cloned().map(Event::Note));
         if checkpoint.is_none() {
@@ -378,7 +382,8 @@ impl Session {
             let text = self.recipe.to_toml();
             write_atomically(&run.recipe(), |out| out.write_all(text.as_bytes()))?;
         }
-        Ok(Begun::new(run, lock, log, learner, &prepared))
+        let clock = Clock::of(&self.recipe);
+        Ok(Begun::new(run, lock, log, learner, &prepared, clock))
     }
 }
 
@@ -403,7 +408,8 @@ struct Begun {
     log: RunLog,
     learner: Learner,
     frame: Frame,
-    ends: [End; 2],
+    /// The shapes, to hold the result against.
+    ends: Vec<End>,
 }
 
 impl Begun {
@@ -413,6 +419,7 @@ impl Begun {
         log: RunLog,
         learner: Learner,
         prepared: &Prepared,
+        clock: Clock,
     ) -> Self {
         let keyframes = &prepared.keyframes;
         Self {
@@ -420,7 +427,7 @@ impl Begun {
             _lock: lock,
             log,
             learner,
-            ends: End::both(&keyframes.keys),
+            ends: End::all(&keyframes.keys, clock),
             frame: Frame {
                 normalisation: keyframes.normalisation,
                 bounds: keyframes.bounds,

@@ -3,6 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use super::checkpoint::Checkpoint;
+use super::clock::Clock;
+use super::extract::even_times;
 use super::folder::RunFolder;
 use super::learned;
 use super::metrics::{self, Metrics};
@@ -56,7 +58,7 @@ pub struct Trained {
 /// A surface at one time, in the coordinates of the run's shapes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Surface {
-    /// The time, 0 to 1.
+    /// The time, between those of the first and the last shape.
     pub time: f64,
     /// Vertices, triangles that are counter-clockwise seen from outside, and unit normals that point
     /// outwards.
@@ -128,7 +130,31 @@ impl Trained {
         Ok(Metrics::read(&self.folder.path().join(metrics::FILE))?)
     }
 
-    /// The surface at time `t`, 0 (the first shape) to 1 (the last); `resolution`: cells of the extraction
+    /// The times of the first and of the last shape: 0 and 1 unless the recipe gives others.
+    pub fn span(&self) -> [f64; 2] {
+        self.clock().span()
+    }
+
+    /// So many times, evenly from the first shape to the last.
+    pub fn even_times(&self, count: usize) -> Vec<f64> {
+        let clock = self.clock();
+        even_times(count)
+            .into_iter()
+            .map(|unit| clock.own(unit))
+            .collect()
+    }
+
+    /// The times of all key frames.
+    pub fn key_times(&self) -> Vec<f64> {
+        let keys = self.recipe.data.keyframes.iter();
+        keys.map(|key| key.time).collect()
+    }
+
+    pub(super) fn clock(&self) -> Clock {
+        Clock::of(&self.recipe)
+    }
+
+    /// The surface at time `t`, from that of the first shape to that of the last ([`Trained::span`]); `resolution`: cells of the extraction
     /// grid along the longest side of the box, 8 or more.
     ///
     /// # Errors
@@ -147,16 +173,16 @@ impl Trained {
         resolution: usize,
         mut progress: impl FnMut(usize),
     ) -> Result<Surface> {
-        check_time(t)?;
+        let unit = self.clock().unit(t)?;
         let learned = &self.learned;
         let grid = Grid::new(learned.bounds.min, learned.bounds.max, resolution)?;
         let found = learned.surface_at(
             &grid,
-            t,
+            unit,
             self.recipe.result.smallest_component,
             &mut progress,
         )?;
-        let (normals, _) = learned.normals(&found.mesh, t);
+        let (normals, _) = learned.normals(&found.mesh, unit);
         let mut mesh = found.mesh.moved(|x| learned.normalisation.invert(x));
         mesh.normals = Some(normals);
         Ok(Surface {
@@ -187,8 +213,8 @@ impl Trained {
         to: f64,
         mut progress: impl FnMut(usize),
     ) -> Result<Vec<[f64; 3]>> {
-        check_time(from)?;
-        check_time(to)?;
+        let from = self.clock().unit(from)?;
+        let to = self.clock().unit(to)?;
         let frame = &self.learned.normalisation;
         let mut moved = Vec::with_capacity(points.len());
         for chunk in points.chunks(CARRIED_AT_A_TIME) {
@@ -208,11 +234,13 @@ impl Trained {
     /// # Errors
     /// A time out of range; a method that moves no points.
     pub fn velocity(&self, points: &[[f64; 3]], t: f64) -> Result<Vec<[f64; 3]>> {
-        check_time(t)?;
+        let clock = self.clock();
+        let unit = clock.unit(t)?;
         let frame = &self.learned.normalisation;
         let motion = self.learned.motion()?;
-        let found = motion.velocities(&normalised(frame, points), t);
-        let own = |v: [f32; 3]| v.map(|part| frame.invert_length(f64::from(part)));
+        let found = motion.velocities(&normalised(frame, points), unit);
+        let length = clock.length();
+        let own = |v: [f32; 3]| v.map(|part| frame.invert_length(f64::from(part)) / length);
         Ok(found.into_iter().map(own).collect())
     }
 
@@ -221,7 +249,7 @@ impl Trained {
     /// # Errors
     /// A time out of range; a method without a field.
     pub fn distance(&self, points: &[[f64; 3]], t: f64) -> Result<Distances> {
-        check_time(t)?;
+        let unit = self.clock().unit(t)?;
         let field = self.learned.deformation.field().ok_or_else(|| {
             Error::usage(format!(
                 "method {}: has no distance field; it carries the source's mesh",
@@ -230,8 +258,8 @@ impl Trained {
         })?;
         let frame = &self.learned.normalisation;
         let points = normalised(frame, points);
-        let values = field.values(&points, t).into_iter();
-        let gradients = field.gradients(&points, t).into_iter();
+        let values = field.values(&points, unit).into_iter();
+        let gradients = field.gradients(&points, unit).into_iter();
         Ok(Distances {
             distances: values
                 .map(|value| frame.invert_length(f64::from(value)))
@@ -243,14 +271,4 @@ impl Trained {
 
 fn normalised(frame: &Normalisation, points: &[[f64; 3]]) -> Vec<[f32; 3]> {
     points.iter().map(|x| frame.apply(*x)).collect()
-}
-
-/// Whether a time lies between those of the first and the last shape.
-pub(super) fn check_time(time: f64) -> Result<()> {
-    if (0.0..=1.0).contains(&time) {
-        return Ok(());
-    }
-    Err(Error::usage(format!(
-        "time {time}: must be 0 to 1 (0 is the source, 1 the target)"
-    )))
 }

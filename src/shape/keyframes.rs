@@ -78,6 +78,15 @@ pub struct Keyframe {
     pub(crate) border: Vec<bool>,
 }
 
+/// What messages call shape `k` of `count`.
+pub(crate) fn key_name(k: usize, count: usize) -> String {
+    match (k, count) {
+        (0, 2) => "source".to_owned(),
+        (1, 2) => "target".to_owned(),
+        _ => format!("key frame {k}"),
+    }
+}
+
 /// Two or more shapes at their times, made ready for training.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Keyframes {
@@ -217,11 +226,15 @@ pub(crate) fn prepare(shapes: &[Shape], options: &DataOptions) -> Result<Keyfram
         notes.extend(mismatch::distance(two));
     }
     for (k, source) in options.between.iter().enumerate() {
-        let rng = Draw::Correspondences(k).generator(options.seed);
+        // Vertices of equal number are the same points throughout a sequence: a draw for all intervals.
+        let same = *source == CorrespondenceSource::SameVertices;
+        let draw = Draw::Correspondences(if same { 0 } else { k });
+        let rng = draw.generator(options.seed);
         let known = correspondences(
             options,
             source,
             [shapes[k].as_ref(), shapes[k + 1].as_ref()],
+            (k > 0).then(|| shapes[0].as_ref()),
             rng,
             &mut notes,
         )?;
@@ -346,6 +359,7 @@ fn correspondences(
     options: &DataOptions,
     from: &CorrespondenceSource,
     [source, target]: [&Shape; 2],
+    first: Option<&Shape>,
     mut rng: ChaCha8Rng,
     notes: &mut Vec<String>,
 ) -> Result<PointPairs, ShapeError> {
@@ -375,7 +389,8 @@ fn correspondences(
     }
     let shared = *from == CorrespondenceSource::SameVertices;
     if shared && source.is_mesh() && source.mesh.triangles == target.mesh.triangles {
-        return Ok(surface_pairs(source, target, count, &mut rng));
+        let first = first.filter(|first| first.mesh.triangles == source.mesh.triangles);
+        return Ok(surface_pairs(first, source, target, count, &mut rng));
     }
     let chosen = available.drawn(count, &mut rng);
     let place = |[from, to]: [u32; 2]| {
@@ -390,17 +405,29 @@ fn correspondences(
     })
 }
 
-/// Points at equal barycentric coordinates of two meshes that share their triangles, drawn by area
-/// of the source.
-fn surface_pairs(source: &Shape, target: &Shape, count: usize, rng: &mut ChaCha8Rng) -> PointPairs {
-    let samples = sample_surface(&source.mesh, count, rng);
-    let places = samples.faces.iter().zip(&samples.barycentric);
-    let moved = places.map(|(&face, weights)| {
-        let triangle = target.mesh.triangles[face as usize];
-        point_at(&target.mesh, triangle, weights.map(f64::from))
-    });
+/// Points at equal barycentric coordinates of two meshes that share their triangles, drawn by area of the source,
+/// or of the first of a sequence: the same points throughout.
+fn surface_pairs(
+    first: Option<&Shape>,
+    source: &Shape,
+    target: &Shape,
+    count: usize,
+    rng: &mut ChaCha8Rng,
+) -> PointPairs {
+    let samples = sample_surface(&first.unwrap_or(source).mesh, count, rng);
+    let on = |mesh: &Mesh<f64>| -> Vec<[f64; 3]> {
+        let places = samples.faces.iter().zip(&samples.barycentric);
+        let place = |(&face, weights): (&u32, &[f32; 3])| {
+            point_at(mesh, mesh.triangles[face as usize], weights.map(f64::from))
+        };
+        places.map(place).collect()
+    };
+    let start = match first {
+        None => samples.points.clone(),
+        Some(_) => on(&source.mesh),
+    };
     PointPairs {
-        places: samples.points.iter().copied().zip(moved).collect(),
+        places: start.into_iter().zip(on(&target.mesh)).collect(),
         confidence: Vec::new(),
     }
 }

@@ -45,6 +45,7 @@ pub(crate) use crate::formats::{FEWEST_POINTS, Shape, ShapeError};
 pub(crate) use crate::geometry::{Bounds, NeighbourSearch};
 pub use clean::CleanOptions;
 pub(crate) use correspond::Correspondences;
+pub(crate) use keyframes::key_name;
 pub(crate) use keyframes::{CorrespondenceSource, DataOptions, prepare, wound_outwards};
 pub use keyframes::{Keyframe, Keyframes, PointCloud};
 pub(crate) use normalise::Normalisation;

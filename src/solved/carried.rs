@@ -4,10 +4,11 @@
 //! f(x, t) = (1 - t) g(phi_{t -> 0}(x)) + t h(phi_{t -> 1}(x))
 //! ```
 //!
-//! as with the default method, `g` and `h` being the signed distances of the shapes themselves.
+//! as with the default method, `g` and `h` being the signed distances of the shapes themselves. Between two of many key
+//! frames the weight is `t^2 (3 - 2 t)` instead of `t`, so that it has no kink where an interval ends.
 //!
 //! Where one of the shapes is not known, beyond the border of a scan or in a hole, the other one alone decides. With
-//! `a` and `b` as how far they are known there, 0 to 1, the weight of `h` is, instead of `t`,
+//! `a` and `b` as how far they are known there, 0 to 1, the weight of `h` is, instead of the `t` above,
 //!
 //! ```text
 //! t a b + t (1 - a) (1 - b) + (1 - a) b
@@ -30,22 +31,40 @@ const MOST_STEPS: usize = 32;
 /// Points of each shape that decide how many steps it takes.
 const PROBES: usize = 2000;
 
-/// Two shapes and the field that carries them.
-pub(super) struct CarriedShapes {
-    field: SplineField,
-    shapes: Arc<[Solid; 2]>,
+/// Two neighbouring shapes and the field that carries them.
+pub(super) struct CarriedShapes<const H: usize> {
+    field: SplineField<f32, H>,
+    shapes: Arc<[Solid]>,
+    /// The first of the two.
+    first: usize,
     /// Of the Runge-Kutta integrator over all of time.
     steps: usize,
 }
 
-impl CarriedShapes {
-    pub(super) fn new(field: SplineField, shapes: Arc<[Solid; 2]>) -> Self {
-        let probes = [0, 1].map(|end: usize| some_of(&shapes[end].parts().points, PROBES));
+impl<const H: usize> CarriedShapes<H> {
+    pub(super) fn new(field: SplineField<f32, H>, shapes: Arc<[Solid]>, first: usize) -> Self {
+        let probes = [0, 1].map(|end: usize| some_of(&shapes[first + end].parts().points, PROBES));
         let steps = field.steps_within([&probes[0], &probes[1]], TOLERANCE, [2, MOST_STEPS]);
         Self {
             field,
             shapes,
+            first,
             steps,
+        }
+    }
+
+    /// The shape at time 0 or at time 1.
+    fn shape(&self, end: usize) -> &Solid {
+        &self.shapes[self.first + end]
+    }
+
+    /// The weight of the second shape where both are known.
+    fn weight(&self, time: f64) -> f32 {
+        let is_part = self.shapes.len() > 2;
+        if is_part {
+            (time * time * (3.0 - 2.0 * time)) as f32
+        } else {
+            time as f32
         }
     }
 
@@ -70,10 +89,11 @@ impl CarriedShapes {
             if weights.is_none() && has_no_weight(end, time) {
                 return vec![0.0; ends.len()];
             }
-            distances(&self.shapes[end], &places[end])
+            distances(self.shape(end), &places[end])
         };
         let (g, h) = (of(0), of(1));
-        let weight = |k: usize| weights.as_ref().map_or(time as f32, |weights| weights[k]);
+        let everywhere = self.weight(time);
+        let weight = |k: usize| weights.as_ref().map_or(everywhere, |weights| weights[k]);
         let blend = |(k, (g, h)): (usize, (&f32, &f32))| (1.0 - weight(k)) * g + weight(k) * h;
         g.iter().zip(&h).enumerate().map(blend).collect()
     }
@@ -81,11 +101,11 @@ impl CarriedShapes {
     /// The weight of the second shape at each place, given where it comes from and goes to; `None` where it is the time
     /// everywhere.
     fn weights(&self, places: [&[[f32; 3]]; 2], time: f64) -> Option<Vec<f32>> {
-        let [a, b] = [0, 1].map(|end: usize| self.shapes[end].known_at(places[end]));
+        let [a, b] = [0, 1].map(|end: usize| self.shape(end).known_at(places[end]));
         if a.is_none() && b.is_none() {
             return None;
         }
-        let t = time as f32;
+        let t = self.weight(time);
         let known = |of: &Option<Vec<f32>>, k: usize| of.as_ref().map_or(1.0, |of| of[k]);
         let weight = |k: usize| {
             let (a, b) = (known(&a, k), known(&b, k));
@@ -100,7 +120,7 @@ impl CarriedShapes {
     }
 }
 
-impl Deformation for CarriedShapes {
+impl<const H: usize> Deformation for CarriedShapes<H> {
     fn field(&self) -> Option<&dyn SurfaceField> {
         Some(self)
     }
@@ -110,7 +130,7 @@ impl Deformation for CarriedShapes {
     }
 }
 
-impl SurfaceField for CarriedShapes {
+impl<const H: usize> SurfaceField for CarriedShapes<H> {
     fn values(&self, points: &[[f32; 3]], time: f64) -> Vec<f32> {
         self.blend(&self.ends(points, time), time, Solid::distances)
     }
@@ -119,15 +139,12 @@ impl SurfaceField for CarriedShapes {
     /// derivative: that of the integrator's own steps, so that it is the gradient of [`Self::values`], but for the
     /// weights where a shape is not known, which count as constant.
     fn gradients(&self, points: &[[f32; 3]], time: f64) -> Vec<[f32; 3]> {
-        let is_known = self
-            .shapes
-            .iter()
-            .all(|shape| shape.parts().known.is_none());
+        let is_known = (0..2).all(|end| self.shape(end).parts().known.is_none());
         let [(g, from), (h, to)] = [0, 1].map(|end: usize| {
             if is_known && has_no_weight(end, time) {
                 return (vec![[0.0; 3]; points.len()], Vec::new());
             }
-            let (shape, until) = (&self.shapes[end], end as f64);
+            let (shape, until) = (self.shape(end), end as f64);
             let steps = self.share(time, until);
             let there = self
                 .field
@@ -144,7 +161,8 @@ impl SurfaceField for CarriedShapes {
         } else {
             self.weights([&from, &to], time)
         };
-        let weight = |k: usize| weights.as_ref().map_or(time as f32, |weights| weights[k]);
+        let everywhere = self.weight(time);
+        let weight = |k: usize| weights.as_ref().map_or(everywhere, |weights| weights[k]);
         let blend = |(k, (g, h)): (usize, (&[f32; 3], &[f32; 3]))| {
             let t = weight(k);
             [0, 1, 2].map(|i| (1.0 - t) * g[i] + t * h[i])
@@ -157,7 +175,7 @@ impl SurfaceField for CarriedShapes {
     }
 }
 
-impl CarriedField for CarriedShapes {
+impl<const H: usize> CarriedField for CarriedShapes<H> {
     fn tolerance(&self) -> f64 {
         TOLERANCE
     }
@@ -174,7 +192,7 @@ impl CarriedField for CarriedShapes {
     }
 }
 
-impl PointMotion for CarriedShapes {
+impl<const H: usize> PointMotion for CarriedShapes<H> {
     fn carry(&self, points: &[[f32; 3]], from: f64, to: f64) -> Vec<[f32; 3]> {
         self.carry_to(points, from, to)
     }

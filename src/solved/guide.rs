@@ -4,7 +4,7 @@
 use isomorph_spline::{Solver, SplineError, SplineField};
 use isomorph_training::data::Guide;
 
-use super::{options, problem, weights};
+use super::problem::{options, problem, weights};
 use crate::recipe::{Recipe, RecipeError};
 use crate::shape::Keyframes;
 

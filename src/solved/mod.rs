@@ -4,7 +4,10 @@
 //! | file | what it holds |
 //! |---|---|
 //! | `mod.rs` | [`Solved`], which makes one step of Gauss-Newton where others make one of an optimiser |
-//! | `carried.rs` | surfaces and motion of its field |
+//! | `motion.rs` | its field and solver, between two shapes or through more |
+//! | `problem.rs` | from a recipe and key frames to what the solver takes |
+//! | `carried.rs` | surfaces and motion of its field between two shapes |
+//! | `sequence.rs` | the same through many key frames |
 //! | `guide.rs` | the field as what a network learns first |
 //! | `stored.rs` | its part of a checkpoint |
 //!
@@ -12,6 +15,9 @@
 
 mod carried;
 mod guide;
+mod motion;
+mod problem;
+mod sequence;
 mod stored;
 #[cfg(test)]
 mod tests;
@@ -19,43 +25,40 @@ mod tests;
 use std::io;
 use std::sync::Arc;
 
-use isomorph_spline::{
-    Cloud, Options, Pairs, Problem, Solver, SplineField, Terms, TimeBasis, Weights,
-};
+use isomorph_spline::{Terms, Weights};
 use isomorph_training::data::TrainingData;
 use isomorph_training::deformation::Deformation;
 use isomorph_training::engine::Trainer;
-use isomorph_training::method::spline;
 use isomorph_training::records::{RecordError, Records};
 use isomorph_training::report::{Phase, Rates, TermReport};
 use isomorph_training::weights::Weights as NetworkWeights;
+use rayon::prelude::*;
 
 use self::carried::CarriedShapes;
 pub(crate) use self::guide::guide;
+use self::motion::{AnySolver, Field};
+use self::sequence::CarriedSequence;
 use crate::recipe::Recipe;
-use crate::shape::{Keyframe, Keyframes, Solid, SolidParts};
+use crate::shape::{Keyframe, Keyframes, Solid, SolidParts, key_name};
 
-/// A field of splines between two shapes, solved for step by step.
+/// A field of splines between shapes, solved for step by step.
 pub(crate) struct Solved {
     motion: Motion,
     /// Steps done.
     step: usize,
     /// What the field carries; none before the checkpoint of a run that is only looked at is read.
-    shapes: Option<Arc<[Solid; 2]>>,
+    shapes: Option<Arc<[Solid]>>,
 }
 
 /// Where the field is.
 enum Motion {
     /// With what makes the steps.
-    Sought(Box<Solver>),
+    Sought(AnySolver),
     /// Of a checkpoint that is only looked at.
-    Found(SplineField),
+    Found(Field),
     /// Of one that is not read yet.
     Unread,
 }
-
-/// Least weight of the strain: without any the field would be free between the samples.
-const LEAST_STRAIN: f64 = 1e-3;
 
 impl Solved {
     /// Before the first step.
@@ -63,21 +66,20 @@ impl Solved {
     /// # Errors
     /// If a shape is neither a closed mesh nor has normals, or the solver refuses the problem.
     pub(crate) fn new(recipe: &Recipe, keyframes: &Keyframes) -> Result<Self, String> {
-        let [first, last] = &keyframes.keys[..] else {
-            return Err(format!(
-                "velocity.kind = \"spline\": takes two shapes, not {}",
-                keyframes.keys.len()
-            ));
-        };
         // Arranging the triangles of one shape takes one core.
-        let (source, target) = rayon::join(|| solid(first, "source"), || solid(last, "target"));
-        let (source, target) = (source?, target?);
-        let solver = Solver::new(problem(recipe, keyframes), weights(recipe), options(recipe));
+        let count = keyframes.keys.len();
+        let shapes: Result<Arc<[Solid]>, String> = keyframes
+            .keys
+            .par_iter()
+            .enumerate()
+            .map(|(k, key)| solid(key, &key_name(k, count)))
+            .collect();
+        let solver = problem::solver(recipe, keyframes);
         let solver = solver.map_err(|error| format!("velocity.kind = \"spline\": {error}"))?;
         Ok(Self {
-            motion: Motion::Sought(Box::new(solver)),
+            motion: Motion::Sought(solver),
             step: 0,
-            shapes: Some(Arc::new([source, target])),
+            shapes: Some(shapes?),
         })
     }
 
@@ -90,15 +92,15 @@ impl Solved {
         }
     }
 
-    fn field(&self) -> &SplineField {
+    fn field(&self) -> Field {
         match &self.motion {
             Motion::Sought(solver) => solver.field(),
-            Motion::Found(field) => field,
+            Motion::Found(field) => field.clone(),
             Motion::Unread => unreachable!("{READ_FIRST}"),
         }
     }
 
-    fn shapes(&self) -> &Arc<[Solid; 2]> {
+    fn shapes(&self) -> &Arc<[Solid]> {
         self.shapes.as_ref().expect(READ_FIRST)
     }
 }
@@ -164,7 +166,7 @@ impl Trainer for Solved {
     }
 
     fn records(&self) -> io::Result<Records> {
-        stored::records(self.field(), self.step, self.shapes())
+        stored::records(&self.field(), self.step, self.shapes())
     }
 
     fn restore(&mut self, records: &Records) -> Result<(), RecordError> {
@@ -172,10 +174,11 @@ impl Trainer for Solved {
         match &mut self.motion {
             Motion::Sought(solver) => {
                 let resumed = solver.resume_from(field, step);
+                let resumed = resumed.ok_or_else(stored::other_kind)?;
                 resumed.map_err(|error| stored::misfit(&error))?;
             }
             motion => {
-                self.shapes = Some(Arc::new(stored::shapes(parts)?));
+                self.shapes = Some(stored::shapes(parts)?.into());
                 *motion = Motion::Found(field);
             }
         }
@@ -190,7 +193,10 @@ impl Trainer for Solved {
 
     fn deformation(&self) -> Box<dyn Deformation> {
         let shapes = Arc::clone(self.shapes());
-        Box::new(CarriedShapes::new(self.field().clone(), shapes))
+        match self.field() {
+            Field::Pair(field) => Box::new(CarriedShapes::new(field, shapes, 0)),
+            Field::Sequence(field) => Box::new(CarriedSequence::new(&field, &shapes)),
+        }
     }
 }
 
@@ -203,82 +209,4 @@ fn solid(key: &Keyframe, name: &str) -> Result<Solid, String> {
     })?;
     let solid = Solid::new(parts);
     solid.ok_or_else(|| format!("the {name} has no area"))
-}
-
-fn problem(recipe: &Recipe, keyframes: &Keyframes) -> Problem {
-    let cloud = |k: usize| {
-        let cloud = &keyframes.keys[k].cloud;
-        Cloud {
-            points: cloud.points.clone(),
-            normals: cloud.normals.clone(),
-            border: keyframes.keys[k].border.clone(),
-        }
-    };
-    // At most so many, evenly chosen: they come in no order that means anything.
-    let known = &keyframes.between[0];
-    let apart = known
-        .len()
-        .div_ceil(recipe.training.correspondence_batch)
-        .max(1);
-    let (source, target) = known.iter().step_by(apart).copied().unzip();
-    let confidence = &keyframes.confidence[0];
-    Problem {
-        shapes: [cloud(0), cloud(1)],
-        pairs: Pairs {
-            source,
-            target,
-            confidence: confidence.iter().step_by(apart).copied().collect(),
-        },
-    }
-}
-
-fn weights(recipe: &Recipe) -> Weights {
-    let loss = &recipe.loss;
-    Weights {
-        matching: loss.matching,
-        on_surface: loss.on_surface,
-        strain: loss.strain.max(LEAST_STRAIN),
-        divergence: loss.divergence,
-        screw: loss.screw,
-    }
-}
-
-fn options(recipe: &Recipe) -> Options {
-    let (keys, training) = (spline::keys(recipe), &recipe.training);
-    let steps = steps_of_levels(training.steps, &keys.coarse_shares);
-    Options {
-        // Of the first level; each further one halves it.
-        spacing: keys.spacing * 2.0_f64.powi(steps.len() as i32 - 1),
-        steps,
-        time: match recipe.velocity.time_dependent {
-            true => TimeBasis::Linear,
-            false => TimeBasis::Constant,
-        },
-        trajectory_steps: training.time_steps,
-        band: keys.band,
-        band_spread: training.band_widths.clone(),
-        surface_samples: keys.surface_samples,
-        robust_scale: keys.robust,
-        iterations: keys.iterations,
-        tolerance: keys.tolerance,
-        seed: training.seed,
-        ..Options::default()
-    }
-}
-
-/// Steps of each level of the grid, the coarsest first; levels without any are left out.
-fn steps_of_levels(steps: usize, coarse_shares: &[f64]) -> Vec<usize> {
-    let mut left = steps;
-    let mut levels: Vec<usize> = coarse_shares
-        .iter()
-        .map(|share| {
-            // The last level has a step at least.
-            let taken = (left as f64 * share).round().min(left as f64 - 1.0) as usize;
-            left -= taken;
-            taken
-        })
-        .collect();
-    levels.push(left);
-    levels.retain(|steps| *steps > 0);
-    levels
 }

@@ -302,7 +302,10 @@ fn the_guide_of_networks_is_the_field_of_the_preset() {
     );
     let places = crate::geometry::testing::random_places(50, 0.5, 3);
     let times = vec![0.3; places.len()];
-    let expected = solved.field().values(&places, 0.3);
+    let Field::Pair(field) = solved.field() else {
+        panic!("two shapes");
+    };
+    let expected = field.values(&places, 0.3);
     assert_eq!(guide.velocities(&places, &times), expected);
 }
 
@@ -329,7 +332,10 @@ fn a_field_without_time_is_stored_and_read() {
     let keyframes = keyframes(0.3);
     let recipe = recipe(&["velocity.time-dependent=false"]);
     let whole = trained(&recipe, &keyframes);
-    assert_eq!(whole.field().time_basis(), TimeBasis::Constant);
+    let Field::Pair(field) = whole.field() else {
+        panic!("two shapes");
+    };
+    assert_eq!(field.time_basis(), isomorph_spline::TimeBasis::Constant);
     let records = whole.records().expect("stored");
     let mut seen = Solved::unset();
     seen.restore(&records).expect("its own record");

@@ -48,6 +48,10 @@ impl OutputFormat {
 pub(crate) struct FrameOptions {
     /// The times, in `[0, 1]`, in the order of the files.
     pub times: Vec<f64>,
+    /// The same in the user's unit, as they are listed.
+    pub names: Vec<f64>,
+    /// The times of the key frames, in `[0, 1]`, if there are more than two.
+    pub keys: Vec<f64>,
     /// Cells along the longest side of the box.
     pub resolution: usize,
     /// The kind of the files.
@@ -57,18 +61,30 @@ pub(crate) struct FrameOptions {
     /// Distances from the surface, in the user's unit, at which layers are written as well.
     pub layers: Vec<f64>,
     /// The mesh or cloud whose vertices are carried too, if any.
-    pub carry: Option<PathBuf>,
+    pub carry: Option<CarriedSource>,
     /// Pieces with less than this share of a surface's area are left out; 0 keeps all.
     pub smallest_component: f64,
     /// The folder that the files go to.
     pub folder: PathBuf,
 }
 
+/// A shape whose vertices are carried.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct CarriedSource {
+    /// Its file.
+    pub file: PathBuf,
+    /// When it is where the file says, in `[0, 1]`.
+    pub time: f64,
+}
+
 /// One entry of `frames.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct FrameEntry {
-    /// The time, 0 to 1.
+    /// The time, in the user's unit.
     pub time: f64,
+    /// The key frame of this time, counted from 0, where there are more than two.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub key: Option<usize>,
     /// The surface's file, relative to `frames.json`.
     pub surface: String,
     /// The mean of `||grad f| - 1|` over the surface's vertices: how far f is from a distance there;
@@ -108,6 +124,8 @@ impl FrameEntry {
 pub(crate) struct Frame {
     /// Its entry in `frames.json`.
     pub entry: FrameEntry,
+    /// The time, in `[0, 1]`.
+    pub time: f64,
     /// The surface in normalised coordinates.
     pub mesh: Mesh<f32>,
     /// Connected pieces.
@@ -130,8 +148,10 @@ impl Frame {
     ) -> Result<Self, FramesError> {
         let agreement = learned.agreement(&found.mesh.vertices, time)?;
         Ok(Self {
+            time,
             entry: FrameEntry {
                 time,
+                key: None,
                 surface: String::new(),
                 slope_error,
                 consistency: agreement.map(|found| found.consistency),
@@ -249,6 +269,8 @@ fn write_frame(
     }
     let mut frame = Frame::measured(learned, found, time, slope_error)?;
     frame.trust = trust;
+    frame.entry.time = options.names[k];
+    frame.entry.key = options.keys.iter().position(|key| *key == time);
     frame.entry.surface = surface;
     frame.entry.carried = carried;
     frame.entry.layers = write_layers(learned, options, grid, k)?;
@@ -258,39 +280,41 @@ fn write_frame(
 /// Carries the vertices of a shape through all times and writes them; the name of the file for each time.
 fn carry(
     learned: &Learned,
-    source: &Path,
+    source: &CarriedSource,
     options: &FrameOptions,
 ) -> Result<Vec<Option<String>>, FramesError> {
+    let CarriedSource { file, time } = source;
     // An animation has no vertices without a place, a file keeps them.
     let shape = match options.format {
-        OutputFormat::Animation(_) => formats::read(source)?,
-        OutputFormat::Frames(_) => formats::read_any(source)?,
+        OutputFormat::Animation(_) => formats::read(file)?,
+        OutputFormat::Frames(_) => formats::read_any(file)?,
     };
     let mut order: Vec<usize> = (0..options.times.len()).collect();
     order.sort_by(|a, b| options.times[*a].total_cmp(&options.times[*b]));
     let times: Vec<f64> = order.iter().map(|k| options.times[*k]).collect();
-    let path = carried_vertices(learned, &shape, &times)?;
+    let path = carried_vertices(learned, &shape, *time, &times)?;
     if let OutputFormat::Animation(precision) = options.format {
         animation::write_carried(&shape, &times, path, precision, &options.folder)?;
         return Ok(vec![Some(animation::CARRIED.to_owned()); times.len()]);
     }
-    let extension = carried_extension(source);
+    let extension = carried_extension(file);
     let mut names = vec![None; options.times.len()];
     for (k, moved) in order.into_iter().zip(path) {
         let name = format!("carried-{k:03}.{extension}");
-        rewrite_vertices(source, &moved, &options.folder.join(&name))?;
+        rewrite_vertices(file, &moved, &options.folder.join(&name))?;
         names[k] = Some(name);
     }
     Ok(names)
 }
 
-/// The vertices of a shape at each of `times`, which ascend, in the coordinates of the shape.
+/// The vertices of a shape of time `from` at each of `times`, which ascend, in the coordinates of the shape.
 ///
 /// # Errors
 /// [`FramesError::NoMotion`].
 pub(crate) fn carried_vertices(
     learned: &Learned,
     shape: &Shape,
+    from: f64,
     times: &[f64],
 ) -> Result<Vec<Vec<[f64; 3]>>, FramesError> {
     let vertices = &shape.mesh.vertices;
@@ -300,7 +324,7 @@ pub(crate) fn carried_vertices(
         false => [0.0; 3],
     };
     let start: Vec<[f32; 3]> = vertices.iter().map(place).collect();
-    let path = learned.path(&start, times)?;
+    let path = path_from(learned, &start, from, times)?;
     // The displacement is added to the vertex as it was read, so that time 0 gives the input back.
     let placed = |now: Vec<[f32; 3]>| {
         (vertices.iter().zip(&start).zip(&now))
@@ -308,4 +332,31 @@ pub(crate) fn carried_vertices(
             .collect()
     };
     Ok(path.into_iter().map(placed).collect())
+}
+
+/// Where points of time `from` are at each of `times`, which ascend.
+fn path_from(
+    learned: &Learned,
+    start: &[[f32; 3]],
+    from: f64,
+    times: &[f64],
+) -> Result<Vec<Vec<[f32; 3]>>, FramesError> {
+    if from == 0.0 {
+        return learned.path(start, times);
+    }
+    let after = times.partition_point(|time| *time < from);
+    let mut path = vec![Vec::new(); times.len()];
+    // Away from the shape both ways, each time from the one before.
+    for order in [
+        (0..after).rev().collect::<Vec<_>>(),
+        (after..times.len()).collect(),
+    ] {
+        let (mut at, mut now) = (start.to_vec(), from);
+        for k in order {
+            at = learned.carry(&at, now, times[k])?;
+            now = times[k];
+            path[k] = at.clone();
+        }
+    }
+    Ok(path)
 }

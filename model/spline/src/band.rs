@@ -6,6 +6,8 @@
 //!
 //! One point in each cell of the band and around it, at a small weight, extends the field smoothly.
 
+use std::sync::Arc;
+
 use rand::seq::index;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -54,9 +56,9 @@ fn spread_indices(rng: &mut ChaCha8Rng, length: usize, amount: usize) -> Vec<usi
 }
 
 /// The band of a step; the clouds in the order of [`by_cell`]. Samples are not finite where the field carries them to infinity.
-pub(crate) fn samples<R: Real>(
-    field: &SplineField<R>,
-    clouds: &[Vec<[R; 3]>; 2],
+pub(crate) fn samples<R: Real, const H: usize>(
+    field: &SplineField<R, H>,
+    clouds: &[Arc<Vec<[R; 3]>>; 2],
     options: &Options,
     [amount, trajectory_steps]: [usize; 2],
     step: usize,
@@ -105,8 +107,8 @@ pub(crate) fn samples<R: Real>(
 }
 
 /// The means of the points in each cube and interval of time.
-fn gathered<R: Real>(
-    field: &SplineField<R>,
+fn gathered<R: Real, const H: usize>(
+    field: &SplineField<R, H>,
     points: &[[R; 3]],
     times: &[R],
     options: &Options,
@@ -153,8 +155,8 @@ fn gathered<R: Real>(
 }
 
 /// Appends a point in each cell of the band and around it.
-fn extend<R: Real>(
-    field: &SplineField<R>,
+fn extend<R: Real, const H: usize>(
+    field: &SplineField<R, H>,
     samples: &mut Vec<Sample<R>>,
     options: &Options,
     step: usize,

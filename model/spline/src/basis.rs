@@ -8,23 +8,27 @@
 //! slopes   -v         1 - 2 u      u
 //! ```
 //!
-//! Time: Legendre polynomials on `[0, 1]`, `T_0 = 1` and `T_1 = 2 t - 1`. A field through several key
-//! frames would put functions with local support here.
+//! Time: Legendre polynomials on `[0, 1]`, `T_0 = 1` and `T_1 = 2 t - 1`; or the three B-splines that an
+//! interval between two of many key frames has, as polynomials on `[0, 1]`.
 
 use crate::real::Real;
 
 /// Nodes of a cell along an axis.
 pub(crate) const SUPPORT: usize = 3;
-/// Functions of time that a place has.
-pub(crate) const TIMES: usize = 2;
+
+/// What functions of time are at a place, two in each half of a node.
+pub(crate) type Times<R, const H: usize> = [[R; 2]; H];
 
 /// The functions of time.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum TimeBasis {
     /// One constant: the field is stationary.
     Constant,
     /// Two polynomials: the field is linear in time.
     Linear,
+    /// Three polynomials: the part of quadratic B-splines between two neighbouring key frames. Of each its
+    /// coefficients of 1, `t` and `t^2`.
+    Quadratic([[f64; 3]; 3]),
 }
 
 impl TimeBasis {
@@ -33,25 +37,40 @@ impl TimeBasis {
         match self {
             Self::Constant => 1,
             Self::Linear => 2,
+            Self::Quadratic(_) => 3,
         }
     }
 
-    /// The functions at a time.
+    /// The functions at a time. A node has room for them in its halves.
     #[inline(always)]
-    pub(crate) fn values<R: Real>(self, t: R) -> [R; TIMES] {
+    pub(crate) fn values<R: Real, const H: usize>(self, t: R) -> Times<R, H> {
+        let mut out = [[R::ZERO; 2]; H];
         match self {
-            Self::Constant => [R::ONE, R::ZERO],
-            Self::Linear => [R::ONE, t + t - R::ONE],
+            Self::Constant => out[0][0] = R::ONE,
+            Self::Linear => out[0] = [R::ONE, t + t - R::ONE],
+            Self::Quadratic(functions) => {
+                for (k, [a, b, c]) in functions.into_iter().enumerate() {
+                    out[k / 2][k % 2] = R::of(a) + t * (R::of(b) + t * R::of(c));
+                }
+            }
         }
+        out
     }
 
     /// Their derivatives.
     #[inline(always)]
-    pub(crate) fn rates<R: Real>(self) -> [R; TIMES] {
+    pub(crate) fn rates<R: Real, const H: usize>(self, t: R) -> Times<R, H> {
+        let mut out = [[R::ZERO; 2]; H];
         match self {
-            Self::Constant => [R::ZERO; TIMES],
-            Self::Linear => [R::ZERO, R::ONE + R::ONE],
+            Self::Constant => {}
+            Self::Linear => out[0][1] = R::ONE + R::ONE,
+            Self::Quadratic(functions) => {
+                for (k, [_, b, c]) in functions.into_iter().enumerate() {
+                    out[k / 2][k % 2] = R::of(b) + (t + t) * R::of(c);
+                }
+            }
         }
+        out
     }
 }
 

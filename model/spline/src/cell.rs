@@ -9,56 +9,80 @@
 //! A node is 8 numbers, `[k][x y z -]`, so that one of them, or half, is one vector. Nodes along the third
 //! axis are contiguous: they are summed over the other two axes first.
 
-use crate::basis::{SUPPORT, TIMES};
+use crate::basis::{SUPPORT, Times};
 use crate::grid::Located;
 use crate::real::{Fuse, Real};
 
-/// Numbers of a node: for each function of time a vector and an idle lane.
-pub(crate) const LANES: usize = 4 * TIMES;
+/// Numbers of half a node: for each of two functions of time a vector and an idle lane.
+pub(crate) const LANES: usize = 8;
 
 /// A vector of space and an idle lane, which is zero. It is carried along to where results are stored: were
 /// it dropped before, the compiler would drop it everywhere and take scalars for the third axis.
 pub(crate) type Lanes<R> = [R; 4];
 
-/// The coefficients of a node. Idle lanes stay zero.
+/// The coefficients of a node, two functions of time in each half. Idle lanes stay zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(C, align(32))]
-pub(crate) struct Node<R>(pub [R; LANES]);
+pub(crate) struct Node<R, const H: usize = 1>(pub [[R; LANES]; H]);
 
-impl<R: Real> Node<R> {
-    pub(crate) const ZERO: Self = Self([R::ZERO; LANES]);
+impl<R: Real, const H: usize> Node<R, H> {
+    pub(crate) const ZERO: Self = Self([[R::ZERO; LANES]; H]);
+
+    /// All numbers in a row.
+    #[inline(always)]
+    pub(crate) fn flat(&self) -> &[R] {
+        self.0.as_flattened()
+    }
+
+    /// All numbers in a row.
+    #[inline(always)]
+    pub(crate) fn flat_mut(&mut self) -> &mut [R] {
+        self.0.as_flattened_mut()
+    }
 
     /// `self += factor other`.
     #[inline(always)]
     pub(crate) fn add<F: Fuse>(&mut self, f: F, factor: R, other: &Self) {
-        self.0 = R::add_eight(f, self.0, factor, other.0);
+        for h in 0..H {
+            self.0[h] = R::add_eight(f, self.0[h], factor, other.0[h]);
+        }
     }
 
     #[inline(always)]
     pub(crate) fn scaled(&self, factor: R) -> Self {
         let mut out = *self;
-        for l in 0..LANES {
-            out.0[l] = out.0[l] * factor;
+        for h in 0..H {
+            for l in 0..LANES {
+                out.0[h][l] = out.0[h][l] * factor;
+            }
         }
         out
     }
 
     /// The sum over the functions of time.
     #[inline(always)]
-    pub(crate) fn at<F: Fuse>(&self, f: F, time: [R; TIMES]) -> Lanes<R> {
+    pub(crate) fn at<F: Fuse>(&self, f: F, time: Times<R, H>) -> Lanes<R> {
         let mut out = [R::ZERO; 4];
         for i in 0..4 {
-            out[i] = f.multiply_add(time[1], self.0[4 + i], time[0] * self.0[i]);
+            let first = &self.0[0];
+            out[i] = f.multiply_add(time[0][1], first[4 + i], time[0][0] * first[i]);
+            for h in 1..H {
+                let [a, b] = time[h];
+                out[i] = f.multiply_add(a, self.0[h][i], out[i]);
+                out[i] = f.multiply_add(b, self.0[h][4 + i], out[i]);
+            }
         }
         out
     }
 
     /// A vector times each function of time.
     #[inline(always)]
-    pub(crate) fn outer(vector: Lanes<R>, time: [R; TIMES]) -> Self {
+    pub(crate) fn outer(vector: Lanes<R>, time: Times<R, H>) -> Self {
         let mut out = Self::ZERO;
-        for l in 0..LANES {
-            out.0[l] = vector[l % 4] * time[l / 4];
+        for h in 0..H {
+            for l in 0..LANES {
+                out.0[h][l] = vector[l % 4] * time[h][l / 4];
+            }
         }
         out
     }
@@ -107,19 +131,19 @@ pub(crate) fn first_three<R: Real>([x, y, z, _]: Lanes<R>) -> [R; 3] {
 
 /// A row of three nodes.
 #[inline(always)]
-fn row<R>(nodes: &[Node<R>], at: usize) -> &[Node<R>] {
+fn row<R, const H: usize>(nodes: &[Node<R, H>], at: usize) -> &[Node<R, H>] {
     &nodes[at..at + SUPPORT]
 }
 
 /// V at a place.
 #[inline(always)]
-pub(crate) fn value<R: Real, F: Fuse>(
+pub(crate) fn value<R: Real, F: Fuse, const H: usize>(
     f: F,
-    nodes: &[Node<R>],
+    nodes: &[Node<R, H>],
     strides: [usize; 2],
     first: u32,
     weights: &[[R; SUPPORT]; 3],
-    time: [R; TIMES],
+    time: Times<R, H>,
 ) -> Lanes<R> {
     let mut sums = [Node::ZERO; SUPPORT];
     for a in 0..SUPPORT {
@@ -136,7 +160,11 @@ pub(crate) fn value<R: Real, F: Fuse>(
 
 /// The sum along the third axis.
 #[inline(always)]
-fn across<R: Real, F: Fuse>(f: F, sums: &[Node<R>; SUPPORT], weights: &[R; SUPPORT]) -> Node<R> {
+fn across<R: Real, F: Fuse, const H: usize>(
+    f: F,
+    sums: &[Node<R, H>; SUPPORT],
+    weights: &[R; SUPPORT],
+) -> Node<R, H> {
     let mut out = sums[0].scaled(weights[0]);
     for c in 1..SUPPORT {
         out.add(f, weights[c], &sums[c]);
@@ -146,13 +174,13 @@ fn across<R: Real, F: Fuse>(f: F, sums: &[Node<R>; SUPPORT], weights: &[R; SUPPO
 
 /// The transpose of [`value`] at a vector: added to the nodes.
 #[inline(always)]
-pub(crate) fn add_value<R: Real, F: Fuse>(
+pub(crate) fn add_value<R: Real, F: Fuse, const H: usize>(
     f: F,
-    nodes: &mut [Node<R>],
+    nodes: &mut [Node<R, H>],
     strides: [usize; 2],
     first: usize,
     weights: &[[R; SUPPORT]; 3],
-    part: &Node<R>,
+    part: &Node<R, H>,
 ) {
     let mut parts = [Node::ZERO; SUPPORT];
     for c in 0..SUPPORT {
@@ -172,13 +200,12 @@ pub(crate) fn add_value<R: Real, F: Fuse>(
 
 /// V, its rate and its Jacobian at a place.
 #[inline(always)]
-pub(crate) fn jet<R: Real, F: Fuse>(
+pub(crate) fn jet<R: Real, F: Fuse, const H: usize>(
     f: F,
-    nodes: &[Node<R>],
+    nodes: &[Node<R, H>],
     strides: [usize; 2],
     place: &Located<R>,
-    time: [R; TIMES],
-    rates: [R; TIMES],
+    [time, rates]: [Times<R, H>; 2],
 ) -> WideJet<R> {
     let (weights, slopes) = (&place.weights, &place.slopes);
     let mut sums = [[Node::ZERO; SUPPORT]; 3];
@@ -212,13 +239,13 @@ pub(crate) fn jet<R: Real, F: Fuse>(
 
 /// The transpose of [`jet`]: what multiplies V, its rate and its Jacobian, added to the nodes.
 #[inline(always)]
-pub(crate) fn add_jet<R: Real, F: Fuse>(
+pub(crate) fn add_jet<R: Real, F: Fuse, const H: usize>(
     f: F,
-    nodes: &mut [Node<R>],
+    nodes: &mut [Node<R, H>],
     strides: [usize; 2],
     place: &Located<R>,
     first: usize,
-    times: [[R; TIMES]; 2],
+    times: [Times<R, H>; 2],
     jet: &WideJet<R>,
 ) {
     let (weights, slopes) = (&place.weights, &place.slopes);

@@ -7,12 +7,23 @@ use rayon::prelude::*;
 
 use crate::cell::Node;
 use crate::real::{Fuse, Kernel, Real, run};
-use crate::scatter::{BLOCK, dot};
-use crate::system::System;
+use crate::scatter::dot;
+
+/// A symmetric positive matrix with a preconditioner.
+pub(crate) trait Linear<R: Real>: Sync {
+    /// Entries that are preconditioned and summed together.
+    fn block(&self) -> usize;
+
+    /// `q = A p`; gives `p . q`.
+    fn product(&mut self, p: &[Node<R>], q: &mut [Node<R>]) -> f64;
+
+    /// `out = P r` for a block of entries that begins at `start`.
+    fn precondition<F: Fuse>(&self, f: F, start: usize, r: &[Node<R>], out: &mut [Node<R>]);
+}
 
 /// The solution and the iterations that it took; nothing if a number on the way is not finite.
 pub(crate) fn solve<R: Real>(
-    system: &mut System<R>,
+    system: &mut impl Linear<R>,
     gradient: &[Node<R>],
     most: usize,
     tolerance: f64,
@@ -55,8 +66,9 @@ pub(crate) fn solve<R: Real>(
             return Some((x, iteration));
         }
         let factor = R::of(next / rz);
-        p.par_chunks_mut(BLOCK)
-            .zip(z.par_chunks(BLOCK))
+        let block = system.block();
+        p.par_chunks_mut(block)
+            .zip(z.par_chunks(block))
             .for_each(|(p, z)| run(Turn { factor, z, p }));
         rz = next;
     }
@@ -65,7 +77,7 @@ pub(crate) fn solve<R: Real>(
 
 /// `x += a p`, `r -= a q`, `z = P r`; gives `r . z`.
 fn update<R: Real>(
-    system: &System<R>,
+    system: &impl Linear<R>,
     factor: R,
     p: &[Node<R>],
     q: &[Node<R>],
@@ -73,18 +85,19 @@ fn update<R: Real>(
     r: &mut [Node<R>],
     z: &mut [Node<R>],
 ) -> f64 {
-    let mut dots = vec![0.0; r.len().div_ceil(BLOCK)];
-    let inputs = p.par_chunks(BLOCK).zip(q.par_chunks(BLOCK));
-    let outputs = r.par_chunks_mut(BLOCK).zip(z.par_chunks_mut(BLOCK));
-    x.par_chunks_mut(BLOCK)
+    let block = system.block();
+    let mut dots = vec![0.0; r.len().div_ceil(block)];
+    let inputs = p.par_chunks(block).zip(q.par_chunks(block));
+    let outputs = r.par_chunks_mut(block).zip(z.par_chunks_mut(block));
+    x.par_chunks_mut(block)
         .zip(inputs)
         .zip(outputs)
         .zip(&mut dots)
         .enumerate()
-        .for_each(|(block, (((x, (p, q)), (r, z)), dot))| {
+        .for_each(|(number, (((x, (p, q)), (r, z)), dot))| {
             run(Update {
                 system,
-                start: block * BLOCK,
+                start: number * block,
                 factor,
                 p,
                 q,
@@ -97,8 +110,8 @@ fn update<R: Real>(
     dots.iter().sum()
 }
 
-struct Update<'a, R: Real> {
-    system: &'a System<R>,
+struct Update<'a, R: Real, S> {
+    system: &'a S,
     start: usize,
     factor: R,
     p: &'a [Node<R>],
@@ -109,7 +122,7 @@ struct Update<'a, R: Real> {
     dot: &'a mut f64,
 }
 
-impl<R: Real> Kernel for Update<'_, R> {
+impl<R: Real, S: Linear<R>> Kernel for Update<'_, R, S> {
     #[inline(always)]
     fn run<F: Fuse>(self, f: F) {
         for (x, p) in self.x.iter_mut().zip(self.p) {
@@ -118,9 +131,7 @@ impl<R: Real> Kernel for Update<'_, R> {
         for (r, q) in self.r.iter_mut().zip(self.q) {
             r.add(f, -self.factor, q);
         }
-        self.system
-            .preconditioner()
-            .apply(f, self.start, self.r, self.z);
+        self.system.precondition(f, self.start, self.r, self.z);
         *self.dot = dot(self.r, self.z);
     }
 }

@@ -9,7 +9,7 @@
 
 use rayon::prelude::*;
 
-use crate::basis::{SUPPORT, TIMES};
+use crate::basis::{SUPPORT, Times};
 use crate::cell::{Lanes, Node, add_value, first_three, value};
 use crate::field::SplineField;
 use crate::real::{Fuse, Kernel, Real, run};
@@ -30,8 +30,8 @@ pub(crate) struct Ends<R> {
 
 impl<R: Real> Ends<R> {
     /// Carries the points from one end of time to the other; `merge`: with places merged.
-    pub(crate) fn new(
-        field: &SplineField<R>,
+    pub(crate) fn new<const H: usize>(
+        field: &SplineField<R, H>,
         starts: &[[R; 3]],
         times: &[[R; 2]],
         steps: usize,
@@ -76,8 +76,8 @@ impl<R: Real> Ends<R> {
     }
 }
 
-struct Sense<'a, R: Real> {
-    flow: Flow<'a, R>,
+struct Sense<'a, R: Real, const H: usize> {
+    flow: Flow<'a, R, H>,
     starts: &'a [[R; 3]],
     times: &'a [[R; 2]],
     steps: usize,
@@ -85,7 +85,7 @@ struct Sense<'a, R: Real> {
     out: &'a mut Ends<R>,
 }
 
-impl<R: Real> Kernel for Sense<'_, R> {
+impl<R: Real, const H: usize> Kernel for Sense<'_, R, H> {
     #[inline(always)]
     fn run<F: Fuse>(self, f: F) {
         let none = Influence {
@@ -109,17 +109,17 @@ impl<R: Real> Kernel for Sense<'_, R> {
 
 /// A place of a trajectory on the grid.
 #[derive(Clone, Copy)]
-pub(crate) struct EndPlace<R> {
+pub(crate) struct EndPlace<R, const H: usize> {
     pub first: u32,
     pub trajectory: u32,
     pub weights: [[R; SUPPORT]; 3],
-    pub time: [R; TIMES],
+    pub time: Times<R, H>,
     pub matrix: Matrix<R>,
 }
 
 /// The quadratic form of the terms at the present field.
-pub(crate) struct EndTerms<R: Real> {
-    pub places: Vec<EndPlace<R>>,
+pub(crate) struct EndTerms<R: Real, const H: usize> {
+    pub places: Vec<EndPlace<R, H>>,
     /// For each trajectory in turn, where its places are in `places`.
     slots: Vec<u32>,
     each: usize,
@@ -128,12 +128,12 @@ pub(crate) struct EndTerms<R: Real> {
     /// With the idle lane of V.
     moves: Vec<Lanes<R>>,
     pulls: Vec<[R; 3]>,
-    parts: Vec<Part<R, 1>>,
+    parts: Vec<Part<Node<R, H>>>,
 }
 
-impl<R: Real> EndTerms<R> {
+impl<R: Real, const H: usize> EndTerms<R, H> {
     pub(crate) fn new(
-        field: &SplineField<R>,
+        field: &SplineField<R, H>,
         ends: &Ends<R>,
         residuals: Vec<[R; 3]>,
         weights: Vec<Matrix<R>>,
@@ -158,7 +158,7 @@ impl<R: Real> EndTerms<R> {
         Self {
             moves: vec![[R::ZERO; 4]; places.len()],
             pulls: vec![[R::ZERO; 3]; residuals.len()],
-            parts: parts(&firsts, grid.strides()),
+            parts: parts(&firsts, grid.strides(), &Node::ZERO),
             places,
             slots,
             each: ends.each,
@@ -167,12 +167,12 @@ impl<R: Real> EndTerms<R> {
         }
     }
 
-    pub(crate) fn parts(&self) -> &[Part<R, 1>] {
+    pub(crate) fn parts(&self) -> &[Part<Node<R, H>>] {
         &self.parts
     }
 
     /// How far each place moves its trajectory's end, if the field moves by `nodes`.
-    pub(crate) fn move_ends(&mut self, nodes: &[Node<R>], strides: [usize; 2]) {
+    pub(crate) fn move_ends(&mut self, nodes: &[Node<R, H>], strides: [usize; 2]) {
         let length = run_length(self.places.len());
         self.moves
             .par_chunks_mut(length)
@@ -189,7 +189,7 @@ impl<R: Real> EndTerms<R> {
 
     /// How far each end moves, if the field moves by `nodes`.
     #[cfg(test)]
-    pub(crate) fn end_moves(&mut self, nodes: &[Node<R>], strides: [usize; 2]) -> Vec<[R; 3]> {
+    pub(crate) fn end_moves(&mut self, nodes: &[Node<R, H>], strides: [usize; 2]) -> Vec<[R; 3]> {
         self.move_ends(nodes, strides);
         let ones = vec![crate::trajectory::diagonal(R::ONE); self.weights.len()];
         let weights = std::mem::replace(&mut self.weights, ones);
@@ -240,14 +240,14 @@ fn product<R: Real>(a: &Matrix<R>, x: [R; 3]) -> [R; 3] {
     [row(0), row(1), row(2)]
 }
 
-struct Move<'a, R> {
-    nodes: &'a [Node<R>],
+struct Move<'a, R, const H: usize> {
+    nodes: &'a [Node<R, H>],
     strides: [usize; 2],
-    places: &'a [EndPlace<R>],
+    places: &'a [EndPlace<R, H>],
     out: &'a mut [Lanes<R>],
 }
 
-impl<R: Real> Kernel for Move<'_, R> {
+impl<R: Real, const H: usize> Kernel for Move<'_, R, H> {
     #[inline(always)]
     fn run<F: Fuse>(self, f: F) {
         for (out, place) in self.out.iter_mut().zip(self.places) {
@@ -259,14 +259,14 @@ impl<R: Real> Kernel for Move<'_, R> {
     }
 }
 
-struct Spread<'a, R> {
+struct Spread<'a, R, const H: usize> {
     pulls: &'a [[R; 3]],
     strides: [usize; 2],
-    places: &'a [EndPlace<R>],
-    part: &'a mut Part<R, 1>,
+    places: &'a [EndPlace<R, H>],
+    part: &'a mut Part<Node<R, H>>,
 }
 
-impl<R: Real> Kernel for Spread<'_, R> {
+impl<R: Real, const H: usize> Kernel for Spread<'_, R, H> {
     #[inline(always)]
     fn run<F: Fuse>(self, f: F) {
         let (start, nodes) = self.part.cleared();

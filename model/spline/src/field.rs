@@ -22,10 +22,10 @@ const PIECE: usize = 256;
 
 /// A velocity field of quadratic B-splines.
 #[derive(Debug, Clone, PartialEq)]
-pub struct SplineField<R: Real = f32> {
+pub struct SplineField<R: Real = f32, const H: usize = 1> {
     grid: Grid<R>,
     basis: TimeBasis,
-    pub(crate) nodes: Vec<Node<R>>,
+    pub(crate) nodes: Vec<Node<R, H>>,
 }
 
 /// Where a point was carried.
@@ -38,12 +38,6 @@ pub struct Carried<R: Real = f32> {
 }
 
 impl<R: Real> SplineField<R> {
-    /// The field that is zero everywhere.
-    pub(crate) fn zero(grid: Grid<R>, basis: TimeBasis) -> Self {
-        let nodes = vec![Node::ZERO; grid.size()];
-        Self { grid, basis, nodes }
-    }
-
     /// The field that is zero, on cells of one edge over a box with `margin` cells around it.
     ///
     /// # Errors
@@ -87,10 +81,22 @@ impl<R: Real> SplineField<R> {
         let each = coefficients.chunks_exact(basis.functions() * 3);
         for (node, values) in out.nodes.iter_mut().zip(each) {
             for (k, values) in values.chunks_exact(3).enumerate() {
-                node.0[4 * k..4 * k + 3].copy_from_slice(values);
+                node.flat_mut()[4 * k..4 * k + 3].copy_from_slice(values);
             }
         }
         Ok(out)
+    }
+}
+
+impl<R: Real, const H: usize> SplineField<R, H> {
+    /// The field that is zero everywhere.
+    ///
+    /// # Panics
+    /// If nodes have no room for the functions of time.
+    pub(crate) fn zero(grid: Grid<R>, basis: TimeBasis) -> Self {
+        assert!(basis.functions() <= 2 * H, "room for each function");
+        let nodes = vec![Node::ZERO; grid.size()];
+        Self { grid, basis, nodes }
     }
 
     /// The grid.
@@ -106,20 +112,22 @@ impl<R: Real> SplineField<R> {
     /// The coefficients, `[nodes x, nodes y, nodes z, functions of time, 3]`.
     pub fn coefficients(&self) -> Vec<R> {
         let functions = self.basis.functions();
-        let of = |node: &Node<R>| {
-            let node = node.0;
-            (0..functions).flat_map(move |k| [node[4 * k], node[4 * k + 1], node[4 * k + 2]])
-        };
-        self.nodes.iter().flat_map(of).collect()
+        let mut out = Vec::with_capacity(3 * functions * self.nodes.len());
+        for node in &self.nodes {
+            for vector in node.flat().chunks_exact(4).take(functions) {
+                out.extend_from_slice(&vector[..3]);
+            }
+        }
+        out
     }
 
     /// Whether all coefficients are finite.
     pub(crate) fn is_finite(&self) -> bool {
-        let finite = |node: &Node<R>| node.0.iter().all(|c| c.wide().is_finite());
+        let finite = |node: &Node<R, H>| node.flat().iter().all(|c| c.wide().is_finite());
         self.nodes.iter().all(finite)
     }
 
-    pub(crate) fn flow(&self) -> Flow<'_, R> {
+    pub(crate) fn flow(&self) -> Flow<'_, R, H> {
         Flow {
             grid: &self.grid,
             strides: self.grid.strides(),
@@ -263,31 +271,42 @@ impl<R: Real> SplineField<R> {
     /// If that grid has too many nodes.
     pub fn refined(&self) -> Result<Self, SplineError> {
         let mut out = Self::zero(self.grid.halved()?, self.basis);
-        let [coarse_y, coarse_z] = self.grid.strides();
-        let [_, ny, nz] = out.grid.nodes();
-        let plane = ny * nz;
-        out.nodes
-            .par_chunks_mut(plane)
-            .enumerate()
-            .for_each(|(x, nodes)| {
-                let x = halved(x);
-                for (at, node) in nodes.iter_mut().enumerate() {
-                    let (y, z) = (halved(at / nz), halved(at % nz));
-                    let first = x.0 * coarse_y + y.0 * coarse_z + z.0;
-                    let mut sum = [0.0; LANES];
-                    for corner in 0..8 {
-                        let [a, b, c] = [corner >> 2, corner >> 1 & 1, corner & 1];
-                        let share = x.1[a] * y.1[b] * z.1[c];
-                        let coarse = &self.nodes[first + a * coarse_y + b * coarse_z + c];
-                        for (sum, value) in sum.iter_mut().zip(coarse.0) {
-                            *sum += share * value.wide();
-                        }
-                    }
-                    node.0 = sum.map(R::of);
-                }
-            });
+        refine(&self.grid, &self.nodes, 1, &out.grid, &mut out.nodes);
         Ok(out)
     }
+}
+
+/// Fills the nodes of the grid of half the spacing; each node is `each` entries.
+pub(crate) fn refine<R: Real, const H: usize>(
+    grid: &Grid<R>,
+    coarse: &[Node<R, H>],
+    each: usize,
+    finer: &Grid<R>,
+    fine: &mut [Node<R, H>],
+) {
+    let [coarse_y, coarse_z] = grid.strides();
+    let [_, ny, nz] = finer.nodes();
+    fine.par_chunks_mut(ny * nz * each)
+        .enumerate()
+        .for_each(|(x, nodes)| {
+            let x = halved(x);
+            for (at, node) in nodes.iter_mut().enumerate() {
+                let (at, entry) = (at / each, at % each);
+                let (y, z) = (halved(at / nz), halved(at % nz));
+                let first = x.0 * coarse_y + y.0 * coarse_z + z.0;
+                let mut sum = [[0.0; LANES]; H];
+                for corner in 0..8 {
+                    let [a, b, c] = [corner >> 2, corner >> 1 & 1, corner & 1];
+                    let share = x.1[a] * y.1[b] * z.1[c];
+                    let from = first + a * coarse_y + b * coarse_z + c;
+                    let sums = sum.as_flattened_mut().iter_mut();
+                    for (sum, value) in sums.zip(coarse[from * each + entry].flat()) {
+                        *sum += share * value.wide();
+                    }
+                }
+                node.0 = sum.map(|half| half.map(R::of));
+            }
+        });
 }
 
 #[track_caller]
@@ -295,14 +314,14 @@ fn same_length<A, B>(points: &[A], times: &[B]) {
     assert_eq!(points.len(), times.len(), "one time for each point");
 }
 
-struct Jets<'a, R: Real> {
-    flow: Flow<'a, R>,
+struct Jets<'a, R: Real, const H: usize> {
+    flow: Flow<'a, R, H>,
     points: &'a [[R; 3]],
     times: &'a [R],
     out: &'a mut [Jet<R>],
 }
 
-impl<R: Real> Kernel for Jets<'_, R> {
+impl<R: Real, const H: usize> Kernel for Jets<'_, R, H> {
     #[inline(always)]
     fn run<F: Fuse>(self, f: F) {
         for ((out, &x), &t) in self.out.iter_mut().zip(self.points).zip(self.times) {
@@ -311,8 +330,8 @@ impl<R: Real> Kernel for Jets<'_, R> {
     }
 }
 
-struct Carry<'a, R: Real> {
-    flow: Flow<'a, R>,
+struct Carry<'a, R: Real, const H: usize> {
+    flow: Flow<'a, R, H>,
     from: &'a [R],
     to: &'a [R],
     steps: usize,
@@ -321,7 +340,7 @@ struct Carry<'a, R: Real> {
     idle: &'a mut R,
 }
 
-impl<R: Real> Kernel for Carry<'_, R> {
+impl<R: Real, const H: usize> Kernel for Carry<'_, R, H> {
     #[inline(always)]
     fn run<F: Fuse>(self, f: F) {
         let mut idle = R::ZERO;
@@ -337,14 +356,14 @@ impl<R: Real> Kernel for Carry<'_, R> {
     }
 }
 
-struct CarryWithGradient<'a, R: Real> {
-    flow: Flow<'a, R>,
+struct CarryWithGradient<'a, R: Real, const H: usize> {
+    flow: Flow<'a, R, H>,
     times: [R; 2],
     steps: usize,
     points: &'a mut [Carried<R>],
 }
 
-impl<R: Real> Kernel for CarryWithGradient<'_, R> {
+impl<R: Real, const H: usize> Kernel for CarryWithGradient<'_, R, H> {
     #[inline(always)]
     fn run<F: Fuse>(self, f: F) {
         for out in self.points {

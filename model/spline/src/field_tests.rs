@@ -179,7 +179,7 @@ fn moves(merge: bool) -> (Vec<[f64; 3]>, Vec<[f64; 3]>) {
     let e = 1e-6;
     let mut along = |by: f64| {
         for (node, direction) in field.nodes.iter_mut().zip(&direction.nodes) {
-            for (value, by_one) in node.0.iter_mut().zip(direction.0) {
+            for (value, &by_one) in node.flat_mut().iter_mut().zip(direction.flat()) {
                 *value += by * by_one;
             }
         }

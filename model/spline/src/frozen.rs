@@ -1,14 +1,16 @@
 //! The objective with its draws held still: what tests take differences of.
 
+use crate::SplineField;
 use crate::band;
 use crate::cell::Node;
 use crate::ends::Ends;
+use crate::hop::{Hop, Pass};
+use crate::options::Options;
 use crate::prior::Sample;
 use crate::real::Real;
 use crate::targets::Targets;
-use crate::{Solver, SplineError, SplineField};
 
-/// The draws of a step, the nearest samples at a field, and the gradient there.
+/// The draws of a step between two shapes, and the nearest samples at a field.
 pub(crate) struct Frozen<R: Real> {
     targets: Targets<R>,
     /// For each on-surface sample, the nearest place, its normal, and the agreement.
@@ -16,52 +18,49 @@ pub(crate) struct Frozen<R: Real> {
     samples: Vec<Sample<R>>,
     /// Of each trajectory.
     steps: usize,
-    ridge: f64,
-    pub gradient: Vec<Node<R>>,
 }
 
-impl<R: Real> Node<R> {
+impl<R: Real, const H: usize> Node<R, H> {
     pub(crate) fn add_plain(&mut self, factor: R, other: &Self) {
-        for (value, other) in self.0.iter_mut().zip(other.0) {
+        for (value, &other) in self.flat_mut().iter_mut().zip(other.flat()) {
             *value += factor * other;
         }
     }
 }
 
-impl<R: Real> Solver<R> {
-    pub(crate) fn frozen(
-        &self,
-        field: &SplineField<R>,
-        level: usize,
-        step: usize,
-    ) -> Result<Frozen<R>, SplineError> {
-        let (problem, surfaces, clouds) = self.given();
-        let (options, weights) = (self.options(), self.weights());
-        let targets = Targets::new(problem, options, weights, step);
-        let steps = self.trajectory_steps(field);
-        let ends = Ends::new(field, &targets.starts, &targets.times, steps, false);
-        let (mut system, _) = self.linearise(field, level, step, false)?;
-        Ok(Frozen {
-            planes: targets.planes(&ends, surfaces),
-            samples: band::samples(
-                field,
-                clouds,
-                options,
-                [options.band.div_ceil(2), steps],
-                step,
-            ),
-            steps,
-            targets,
-            ridge: system.ridge().wide(),
-            gradient: system.gradient(field),
-        })
-    }
+/// Half the sum of the squares of all coefficients.
+pub(crate) fn half_squares<R: Real>(nodes: &[Node<R>]) -> f64 {
+    let squares = nodes.iter().flat_map(|node| node.0[0]);
+    0.5 * squares.map(|c| c.wide().powi(2)).sum::<f64>()
 }
 
 impl<R: Real> Frozen<R> {
-    /// The objective, written out from its formula.
-    pub(crate) fn objective(&self, solver: &Solver<R>, field: &SplineField<R>) -> f64 {
-        let (options, weights) = (solver.options(), solver.weights());
+    pub(crate) fn new<const H: usize>(
+        hop: &Hop<R>,
+        field: &SplineField<R, H>,
+        options: &Options,
+        pass: Pass,
+    ) -> Self {
+        let targets = Targets::new(&hop.problem, options, &hop.weights, pass.draw);
+        let steps = hop.trajectory_steps(field, options);
+        let ends = Ends::new(field, &targets.starts, &targets.times, steps, false);
+        let amount = [options.band_at(pass.level), steps];
+        Self {
+            planes: targets.planes(&ends, &hop.surfaces),
+            samples: band::samples(field, &hop.clouds, options, amount, pass.draw),
+            steps,
+            targets,
+        }
+    }
+
+    /// The objective without the ridge, written out from its formula.
+    pub(crate) fn objective<const H: usize>(
+        &self,
+        hop: &Hop<R>,
+        field: &SplineField<R, H>,
+        options: &Options,
+    ) -> f64 {
+        let weights = &hop.weights;
         let from: Vec<R> = self.targets.times.iter().map(|times| times[0]).collect();
         let to: Vec<R> = self.targets.times.iter().map(|times| times[1]).collect();
         let ends = field.carry_each(&self.targets.starts, &from, &to, self.steps);
@@ -93,7 +92,6 @@ impl<R: Real> Frozen<R> {
                     + weights.screw * screw
                     + weights.divergence * divergence);
         }
-        let squares = field.nodes.iter().flat_map(|node| node.0);
-        sum + self.ridge / 2.0 * squares.map(|c| c.wide().powi(2)).sum::<f64>()
+        sum
     }
 }

@@ -12,7 +12,9 @@
 //! | `targets`, `ends` | terms on where trajectories end |
 //! | `band`, `prior` | terms on the field itself, and the points at which they are taken |
 //! | `scatter`, `system`, `preconditioner`, `conjugate` | the linear system of a step |
+//! | `hop` | two neighbouring shapes, and all terms between them |
 //! | `solver`, `samples` | the steps, and what each takes its terms at |
+//! | `sequence` | the same through many key frames |
 //! | `real` | f32 or f64, and vector instructions chosen at run time |
 
 #![expect(
@@ -32,6 +34,7 @@ mod field_tests;
 #[cfg(test)]
 mod frozen;
 mod grid;
+mod hop;
 mod options;
 mod preconditioner;
 mod prior;
@@ -39,6 +42,7 @@ mod problem;
 mod real;
 mod samples;
 mod scatter;
+mod sequence;
 mod solver;
 #[cfg(test)]
 mod solver_tests;
@@ -55,4 +59,5 @@ pub use options::{Options, Weights};
 pub use problem::{Cloud, Pairs, Problem};
 pub use real::Real;
 pub use samples::{Arrival, BandPlace, Samples};
+pub use sequence::{SequenceField, SequenceProblem, SequenceSolver};
 pub use solver::{Solver, StepReport, Terms};

@@ -1,7 +1,7 @@
 //! The inverse of the Gauss-Newton matrix' diagonal blocks, one for each node.
 //!
-//! A node has 6 unknowns. Its block is a sum over places of `T_k T_l B`, where `B` is a symmetric 3 x 3
-//! matrix:
+//! A node has 6 unknowns, or 9 between two of many key frames. Its block is a sum over places of `T_k T_l B`, where
+//! `B` is a symmetric 3 x 3 matrix:
 //!
 //! ```text
 //! trajectories   B = w_n^2 M^T W M, each place for itself
@@ -10,11 +10,11 @@
 //! ```
 //!
 //! A vector holds the six numbers of `B` as `[00 11 22 01 02 12 - -]`, and a node three of them, for
-//! `k l = 00, 01, 11`.
+//! `k l = 00, 01, 11`, or six, for `k l = 00, 01, 02, 11, 12, 22`.
 
 use rayon::prelude::*;
 
-use crate::basis::{SUPPORT, TIMES};
+use crate::basis::{SUPPORT, Times};
 use crate::cell::{LANES, Node};
 use crate::ends::{EndPlace, EndTerms};
 use crate::prior::{PriorPlace, PriorTerms};
@@ -23,33 +23,37 @@ use crate::scatter::{BLOCK, Part, each_run, overlap, parts};
 use crate::trajectory::Matrix;
 
 /// Unknowns of a node.
-const SIZE: usize = 3 * TIMES;
-/// Pairs of functions of time.
+const SIZE: usize = 6;
+/// Pairs of two functions of time.
 const PAIRS: usize = 3;
 /// Lanes of the upper triangle.
-const LANE_OF: [[usize; 3]; 3] = [[0, 3, 4], [3, 1, 5], [4, 5, 2]];
+pub(crate) const LANE_OF: [[usize; 3]; 3] = [[0, 3, 4], [3, 1, 5], [4, 5, 2]];
 /// Added to a block's diagonal, as a part of its mean.
-const LIFT: f64 = 1e-6;
+pub(crate) const LIFT: f64 = 1e-6;
 
-type Sums<R> = [Node<R>; PAIRS];
+type Sums<R, const P: usize> = [Node<R>; P];
+
+/// The diagonal blocks of one hop, as parts that are to be summed.
+pub(crate) struct NodeBlocks<R, const P: usize> {
+    of_ends: Vec<Part<Sums<R, P>>>,
+    of_priors: Vec<Part<Sums<R, P>>>,
+}
 
 /// Columns of the inverse block of each node.
 pub(crate) struct Preconditioner<R> {
     inverses: Vec<[Node<R>; SIZE]>,
 }
 
-impl<R: Real> Preconditioner<R> {
-    /// The blocks of both kinds of terms and of the ridge, inverted.
-    pub(crate) fn new(
-        ends: &EndTerms<R>,
-        priors: &PriorTerms<R>,
-        ridge: f64,
-        nodes: usize,
+impl<R: Real, const P: usize> NodeBlocks<R, P> {
+    /// The blocks of both kinds of terms.
+    pub(crate) fn new<const H: usize>(
+        ends: &EndTerms<R, H>,
+        priors: &PriorTerms<R, H>,
         strides: [usize; 2],
-        rates: [R; TIMES],
     ) -> Self {
+        let zero = [Node::ZERO; P];
         let firsts: Vec<u32> = ends.places.iter().map(|place| place.first).collect();
-        let mut of_ends: Vec<Part<R, PAIRS>> = parts(&firsts, strides);
+        let mut of_ends = parts(&firsts, strides, &zero);
         each_run(&mut of_ends, &ends.places, |part, places| {
             run(EndBlocks {
                 places,
@@ -63,24 +67,35 @@ impl<R: Real> Preconditioner<R> {
             .iter()
             .map(|place| place.located.first)
             .collect();
-        let mut of_priors: Vec<Part<R, PAIRS>> = parts(&firsts, strides);
+        let mut of_priors = parts(&firsts, strides, &zero);
         each_run(&mut of_priors, &priors.places, |part, places| {
             run(PriorBlocks {
                 places,
-                rates,
                 strides,
                 part,
             });
         });
+        Self { of_ends, of_priors }
+    }
+
+    /// The sums of `count` nodes from `start` on.
+    pub(crate) fn sums(&self, start: usize, count: usize) -> Vec<[[f64; LANES]; P]> {
+        let mut sums = vec![[[0.0; LANES]; P]; count];
+        add_parts(&self.of_ends, start, &mut sums);
+        add_parts(&self.of_priors, start, &mut sums);
+        sums
+    }
+}
+
+impl<R: Real> Preconditioner<R> {
+    /// The blocks and the ridge, inverted.
+    pub(crate) fn new(blocks: &NodeBlocks<R, PAIRS>, ridge: f64, nodes: usize) -> Self {
         let mut inverses = vec![[Node::ZERO; SIZE]; nodes];
         inverses
             .par_chunks_mut(BLOCK)
             .enumerate()
             .for_each(|(block, out)| {
-                let start = block * BLOCK;
-                let mut sums = vec![[[0.0; LANES]; PAIRS]; out.len()];
-                add_parts(&of_ends, start, &mut sums);
-                add_parts(&of_priors, start, &mut sums);
+                let sums = blocks.sums(block * BLOCK, out.len());
                 for (out, sums) in out.iter_mut().zip(&sums) {
                     *out = inverse(sums, ridge);
                 }
@@ -94,14 +109,18 @@ impl<R: Real> Preconditioner<R> {
         for ((columns, r), out) in self.inverses[start..].iter().zip(r).zip(out) {
             let mut sum = Node::ZERO;
             for (j, column) in columns.iter().enumerate() {
-                sum.add(f, r.0[j / 3 * 4 + j % 3], column);
+                sum.add(f, r.0[0][j / 3 * 4 + j % 3], column);
             }
             *out = sum;
         }
     }
 }
 
-fn add_parts<R: Real>(parts: &[Part<R, PAIRS>], start: usize, sums: &mut [[[f64; LANES]; PAIRS]]) {
+fn add_parts<R: Real, const P: usize>(
+    parts: &[Part<Sums<R, P>>],
+    start: usize,
+    sums: &mut [[[f64; LANES]; P]],
+) {
     for part in parts {
         let (from, to) = overlap(part, start, start + sums.len());
         for at in from..to {
@@ -109,7 +128,7 @@ fn add_parts<R: Real>(parts: &[Part<R, PAIRS>], start: usize, sums: &mut [[[f64;
                 .iter_mut()
                 .zip(&part.nodes[at - part.start])
             {
-                for (sum, value) in sum.iter_mut().zip(node.0) {
+                for (sum, value) in sum.iter_mut().zip(node.0[0]) {
                     *sum += value.wide();
                 }
             }
@@ -137,7 +156,7 @@ fn inverse<R: Real>(sums: &[[f64; LANES]; PAIRS], ridge: f64) -> [Node<R>; SIZE]
     let inverse = inverse_of_positive(block);
     for (column, row) in out.iter_mut().zip(inverse) {
         for (i, value) in row.into_iter().enumerate() {
-            column.0[i / 3 * 4 + i % 3] = R::of(value);
+            column.0[0][i / 3 * 4 + i % 3] = R::of(value);
         }
     }
     out
@@ -189,30 +208,36 @@ fn squared<R: Real>(m: &Matrix<R>, w: &Matrix<R>) -> [R; LANES] {
     ]
 }
 
+/// The products of two functions of time, in the order of the sums.
 #[inline(always)]
-fn time_pairs<R: Real>(time: [R; TIMES]) -> [R; PAIRS] {
-    [time[0] * time[0], time[0] * time[1], time[1] * time[1]]
+fn time_pairs<R: Real, const H: usize, const P: usize>(time: &Times<R, H>) -> [R; P] {
+    let functions = if P == PAIRS { 2 } else { 3 };
+    let mut out = [R::ZERO; P];
+    let mut at = 0;
+    for k in 0..functions {
+        for l in k..functions {
+            out[at] = time[k / 2][k % 2] * time[l / 2][l % 2];
+            at += 1;
+        }
+    }
+    out
 }
 
-struct EndBlocks<'a, R> {
-    places: &'a [EndPlace<R>],
+struct EndBlocks<'a, R, const H: usize, const P: usize> {
+    places: &'a [EndPlace<R, H>],
     weights: &'a [Matrix<R>],
     strides: [usize; 2],
-    part: &'a mut Part<R, PAIRS>,
+    part: &'a mut Part<Sums<R, P>>,
 }
 
-impl<R: Real> Kernel for EndBlocks<'_, R> {
+impl<R: Real, const H: usize, const P: usize> Kernel for EndBlocks<'_, R, H, P> {
     #[inline(always)]
     fn run<F: Fuse>(self, f: F) {
         for place in self.places {
             let weight = &self.weights[place.trajectory as usize];
-            let packed = Node(squared(&place.matrix, weight));
-            let pairs = time_pairs(place.time);
-            let scaled = [
-                packed.scaled(pairs[0]),
-                packed.scaled(pairs[1]),
-                packed.scaled(pairs[2]),
-            ];
+            let packed = Node([squared(&place.matrix, weight)]);
+            let pairs: [R; P] = time_pairs(&place.time);
+            let scaled = pairs.map(|pair| packed.scaled(pair));
             let first = place.first as usize - self.part.start;
             for a in 0..SUPPORT {
                 for b in 0..SUPPORT {
@@ -228,26 +253,29 @@ impl<R: Real> Kernel for EndBlocks<'_, R> {
 }
 
 #[inline(always)]
-fn add_scaled<R: Real, F: Fuse>(f: F, sums: &mut Sums<R>, factor: R, parts: &Sums<R>) {
-    for k in 0..PAIRS {
+fn add_scaled<R: Real, F: Fuse, const P: usize>(
+    f: F,
+    sums: &mut Sums<R, P>,
+    factor: R,
+    parts: &Sums<R, P>,
+) {
+    for k in 0..P {
         sums[k].add(f, factor, &parts[k]);
     }
 }
 
-struct PriorBlocks<'a, R: Real> {
-    places: &'a [PriorPlace<R>],
-    rates: [R; TIMES],
+struct PriorBlocks<'a, R: Real, const H: usize, const P: usize> {
+    places: &'a [PriorPlace<R, H>],
     strides: [usize; 2],
-    part: &'a mut Part<R, PAIRS>,
+    part: &'a mut Part<Sums<R, P>>,
 }
 
-impl<R: Real> Kernel for PriorBlocks<'_, R> {
+impl<R: Real, const H: usize, const P: usize> Kernel for PriorBlocks<'_, R, H, P> {
     #[inline(always)]
     fn run<F: Fuse>(self, f: F) {
-        let rate_pairs = time_pairs(self.rates);
         for place in self.places {
             let (w, d) = (&place.located.weights, &place.located.slopes);
-            let pairs = time_pairs(place.time);
+            let [pairs, rate_pairs]: [[R; P]; 2] = place.times.each_ref().map(time_pairs);
             let first = place.located.first as usize - self.part.start;
             for a in 0..SUPPORT {
                 for b in 0..SUPPORT {
@@ -259,10 +287,10 @@ impl<R: Real> Kernel for PriorBlocks<'_, R> {
                         let screw = place.factors[2] * weight * weight;
                         let at = first + a * self.strides[0] + b * self.strides[1] + c;
                         let sums = &mut self.part.nodes[at];
-                        for k in 0..PAIRS {
+                        for k in 0..P {
                             sums[k].add(f, pairs[k], &packed);
                             for i in 0..3 {
-                                sums[k].0[i] += screw * rate_pairs[k];
+                                sums[k].0[0][i] += screw * rate_pairs[k];
                             }
                         }
                     }
@@ -280,7 +308,7 @@ fn gradients<R: Real>(factors: &[R; 3], g: [R; 3]) -> Node<R> {
         half + factors[1],
         half * (g[0] * g[0] + g[1] * g[1] + g[2] * g[2]),
     );
-    Node([
+    Node([[
         both * g[0] * g[0] + square,
         both * g[1] * g[1] + square,
         both * g[2] * g[2] + square,
@@ -289,7 +317,7 @@ fn gradients<R: Real>(factors: &[R; 3], g: [R; 3]) -> Node<R> {
         both * g[1] * g[2],
         R::ZERO,
         R::ZERO,
-    ])
+    ]])
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@
 //! Strain and screw vanish for rigid motion along a screw. `|tr J|` is `sqrt((tr J)^2 + 0.05^2)`, by
 //! iteratively reweighted squares. The screw term is linearised at the present field.
 
-use crate::basis::TIMES;
+use crate::basis::Times;
 use crate::cell::{Jet, Node, WideJet, add_jet, jet};
 use crate::field::SplineField;
 use crate::grid::Located;
@@ -31,9 +31,10 @@ pub(crate) struct Sample<R> {
 }
 
 /// A point of the band on the grid, with what is linearised there.
-pub(crate) struct PriorPlace<R: Real> {
+pub(crate) struct PriorPlace<R: Real, const H: usize> {
     pub located: Located<R>,
-    pub time: [R; TIMES],
+    /// The functions of time, and their derivatives.
+    pub times: [Times<R, H>; 2],
     /// Of strain, divergence and screw.
     pub factors: [R; 3],
     value: [R; 3],
@@ -50,15 +51,14 @@ pub(crate) struct PriorMeans {
 }
 
 /// The quadratic form of the terms at the present field.
-pub(crate) struct PriorTerms<R: Real> {
-    pub places: Vec<PriorPlace<R>>,
+pub(crate) struct PriorTerms<R: Real, const H: usize> {
+    pub places: Vec<PriorPlace<R, H>>,
     pub means: PriorMeans,
-    rates: [R; TIMES],
-    parts: Vec<Part<R, 1>>,
+    parts: Vec<Part<Node<R, H>>>,
 }
 
-impl<R: Real> PriorTerms<R> {
-    pub(crate) fn new(field: &SplineField<R>, samples: &[Sample<R>], weights: &Weights) -> Self {
+impl<R: Real, const H: usize> PriorTerms<R, H> {
+    pub(crate) fn new(field: &SplineField<R, H>, samples: &[Sample<R>], weights: &Weights) -> Self {
         let first = |sample: &Sample<R>| field.grid().locate(sample.point).first;
         let order = by_first(samples.iter().map(first));
         let sorted: Vec<&Sample<R>> = order.iter().map(|&(_, at)| &samples[at as usize]).collect();
@@ -79,25 +79,22 @@ impl<R: Real> PriorTerms<R> {
         }
         let firsts: Vec<u32> = order.iter().map(|&(first, _)| first).collect();
         Self {
-            parts: parts(&firsts, field.grid().strides()),
+            parts: parts(&firsts, field.grid().strides(), &Node::ZERO),
             places,
             means,
-            rates: field.time_basis().rates(),
         }
     }
 
-    pub(crate) fn parts(&self) -> &[Part<R, 1>] {
+    pub(crate) fn parts(&self) -> &[Part<Node<R, H>>] {
         &self.parts
     }
 
     /// The parts of the product with the Gauss-Newton matrix.
-    pub(crate) fn spread_product(&mut self, nodes: &[Node<R>], strides: [usize; 2]) {
-        let rates = self.rates;
+    pub(crate) fn spread_product(&mut self, nodes: &[Node<R, H>], strides: [usize; 2]) {
         each_run(&mut self.parts, &self.places, |part, places| {
             run(Product {
                 nodes,
                 strides,
-                rates,
                 places,
                 part,
             });
@@ -106,11 +103,9 @@ impl<R: Real> PriorTerms<R> {
 
     /// The parts of the gradient.
     pub(crate) fn spread_gradient(&mut self, strides: [usize; 2]) {
-        let rates = self.rates;
         each_run(&mut self.parts, &self.places, |part, places| {
             run(Gradient {
                 strides,
-                rates,
                 places,
                 part,
             });
@@ -118,15 +113,16 @@ impl<R: Real> PriorTerms<R> {
     }
 }
 
-impl<R: Real> PriorPlace<R> {
-    fn new(field: &SplineField<R>, sample: &Sample<R>, base: Jet<R>, weights: &Weights) -> Self {
+impl<R: Real, const H: usize> PriorPlace<R, H> {
+    fn new(field: &SplineField<R, H>, sample: &Sample<R>, base: Jet<R>, weights: &Weights) -> Self {
         let j = &base.jacobian;
         let trace = (j[0][0] + j[1][1] + j[2][2]).wide();
         let divergence = weights.divergence / trace.hypot(DIVERGENCE_SCALE);
+        let basis = field.time_basis();
         let factor = |weight: f64| R::of(weight * sample.share);
         Self {
             located: field.grid().locate(sample.point),
-            time: field.time_basis().values(sample.time),
+            times: [basis.values(sample.time), basis.rates(sample.time)],
             factors: [
                 factor(2.0 * weights.strain),
                 factor(divergence),
@@ -195,21 +191,20 @@ fn symmetric<R: Real>(j: &Matrix<R>) -> Matrix<R> {
     out
 }
 
-struct Product<'a, R: Real> {
-    nodes: &'a [Node<R>],
+struct Product<'a, R: Real, const H: usize> {
+    nodes: &'a [Node<R, H>],
     strides: [usize; 2],
-    rates: [R; TIMES],
-    places: &'a [PriorPlace<R>],
-    part: &'a mut Part<R, 1>,
+    places: &'a [PriorPlace<R, H>],
+    part: &'a mut Part<Node<R, H>>,
 }
 
-impl<R: Real> Kernel for Product<'_, R> {
+impl<R: Real, const H: usize> Kernel for Product<'_, R, H> {
     #[inline(always)]
     fn run<F: Fuse>(self, f: F) {
         let (start, nodes) = self.part.cleared();
         for place in self.places {
-            let (located, times) = (&place.located, [place.time, self.rates]);
-            let u = jet(f, self.nodes, self.strides, located, times[0], times[1]);
+            let (located, times) = (&place.located, place.times);
+            let u = jet(f, self.nodes, self.strides, located, times);
             let jet = u.narrow();
             let d = symmetric(&jet.jacobian);
             let mut r = jet.rate;
@@ -225,14 +220,13 @@ impl<R: Real> Kernel for Product<'_, R> {
     }
 }
 
-struct Gradient<'a, R: Real> {
+struct Gradient<'a, R: Real, const H: usize> {
     strides: [usize; 2],
-    rates: [R; TIMES],
-    places: &'a [PriorPlace<R>],
-    part: &'a mut Part<R, 1>,
+    places: &'a [PriorPlace<R, H>],
+    part: &'a mut Part<Node<R, H>>,
 }
 
-impl<R: Real> Kernel for Gradient<'_, R> {
+impl<R: Real, const H: usize> Kernel for Gradient<'_, R, H> {
     #[inline(always)]
     fn run<F: Fuse>(self, f: F) {
         let (start, nodes) = self.part.cleared();
@@ -242,7 +236,7 @@ impl<R: Real> Kernel for Gradient<'_, R> {
             columns: [[R::ZERO; 4]; 3],
         };
         for place in self.places {
-            let (located, times) = (&place.located, [place.time, self.rates]);
+            let (located, times) = (&place.located, place.times);
             let pull = place.pull(&place.symmetric, place.screw(), &none);
             let first = located.first as usize - start;
             add_jet(f, nodes, self.strides, located, first, times, &pull);

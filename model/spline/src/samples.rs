@@ -72,15 +72,14 @@ impl<R: Real> Solver<R> {
     /// If there is no such step, or the field is not on the grid of the step before.
     pub fn samples(&self, step: usize) -> Result<Samples<R>, SplineError> {
         let (field, level) = self.field_at(step)?;
-        let (problem, surfaces, clouds) = self.given();
-        let (options, weights) = (self.options(), self.weights());
-        let targets = Targets::new(problem, options, weights, step);
-        let steps = self.trajectory_steps(&field);
+        let (hop, options) = (self.hop(), self.options());
+        let targets = Targets::new(&hop.problem, options, &hop.weights, step);
+        let steps = hop.trajectory_steps(&field, options);
         let ends = Ends::new(&field, &targets.starts, &targets.times, steps, false);
-        let (pairs, surface) = targets.arrivals(&ends, surfaces);
+        let (pairs, surface) = targets.arrivals(&ends, &hop.surfaces);
         let amount = options.band_at(level);
         let drawn = 2 * amount.div_ceil(2);
-        let samples = band::samples(&field, clouds, options, [amount, steps], step);
+        let samples = band::samples(&field, &hop.clouds, options, [amount, steps], step);
         let inside = samples.iter().filter(|sample| sample.inside);
         let band = inside.map(|sample| BandPlace {
             point: sample.point,

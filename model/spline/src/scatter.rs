@@ -6,7 +6,7 @@
 use rayon::prelude::*;
 
 use crate::basis::SUPPORT;
-use crate::cell::Node;
+use crate::cell::{LANES, Node};
 use crate::real::{Fuse, Kernel, Real, run};
 
 /// Runs of places: also the most cores that share a pass.
@@ -15,11 +15,11 @@ pub(crate) const CHUNKS: usize = 16;
 /// Nodes that a thread adds up at a time.
 pub(crate) const BLOCK: usize = 512;
 
-/// A private copy of a range of nodes, `N` vectors for each.
-pub(crate) struct Part<R, const N: usize> {
+/// A private copy of a range of nodes: what is summed for each.
+pub(crate) struct Part<T> {
     /// The first node.
     pub start: usize,
-    pub nodes: Vec<[Node<R>; N]>,
+    pub nodes: Vec<T>,
 }
 
 /// Places in a run, of so many in all.
@@ -28,29 +28,25 @@ pub(crate) fn run_length(places: usize) -> usize {
 }
 
 /// The private copies for places whose first nodes, sorted, are these.
-pub(crate) fn parts<R: Real, const N: usize>(
-    firsts: &[u32],
-    strides: [usize; 2],
-) -> Vec<Part<R, N>> {
+pub(crate) fn parts<T: Clone>(firsts: &[u32], strides: [usize; 2], zero: &T) -> Vec<Part<T>> {
     let beyond = (SUPPORT - 1) * (strides[0] + strides[1] + 1) + 1;
     let part = |run: &[u32]| {
         let start = run[0] as usize;
         let end = run[run.len() - 1] as usize + beyond;
         Part {
             start,
-            nodes: vec![[Node::ZERO; N]; end - start],
+            nodes: vec![zero.clone(); end - start],
         }
     };
     firsts.chunks(run_length(firsts.len())).map(part).collect()
 }
 
-impl<R: Real> Part<R, 1> {
+impl<R: Real, const H: usize> Part<Node<R, H>> {
     /// The first node, and the nodes, cleared.
     #[inline(always)]
-    pub(crate) fn cleared(&mut self) -> (usize, &mut [Node<R>]) {
-        let nodes = self.nodes.as_flattened_mut();
-        nodes.fill(Node::ZERO);
-        (self.start, nodes)
+    pub(crate) fn cleared(&mut self) -> (usize, &mut [Node<R, H>]) {
+        self.nodes.fill(Node::ZERO);
+        (self.start, &mut self.nodes)
     }
 }
 
@@ -63,10 +59,10 @@ pub(crate) fn by_first(firsts: impl Iterator<Item = u32>) -> Vec<(u32, u32)> {
 }
 
 /// Gives each run of sorted places to `spread`, with its private copy of the nodes, on all cores.
-pub(crate) fn each_run<R: Real, T: Sync, const N: usize>(
-    parts: &mut [Part<R, N>],
+pub(crate) fn each_run<S: Send, T: Sync>(
+    parts: &mut [Part<S>],
     places: &[T],
-    spread: impl Fn(&mut Part<R, N>, &[T]) + Sync,
+    spread: impl Fn(&mut Part<S>, &[T]) + Sync,
 ) {
     parts
         .par_iter_mut()
@@ -75,11 +71,11 @@ pub(crate) fn each_run<R: Real, T: Sync, const N: usize>(
 }
 
 /// `out = base_factor base + sum of the parts`, and `base . out` in float64.
-pub(crate) fn add_up<R: Real>(
-    parts: &[&[Part<R, 1>]],
-    base: &[Node<R>],
+pub(crate) fn add_up<R: Real, const H: usize>(
+    parts: &[&[Part<Node<R, H>>]],
+    base: &[Node<R, H>],
     base_factor: R,
-    out: &mut [Node<R>],
+    out: &mut [Node<R, H>],
 ) -> f64 {
     let dots: Vec<f64> = out
         .par_chunks_mut(BLOCK)
@@ -101,16 +97,16 @@ pub(crate) fn add_up<R: Real>(
     dots.iter().sum()
 }
 
-struct AddUp<'a, R> {
-    parts: &'a [&'a [Part<R, 1>]],
-    base: &'a [Node<R>],
+struct AddUp<'a, R, const H: usize> {
+    parts: &'a [&'a [Part<Node<R, H>>]],
+    base: &'a [Node<R, H>],
     base_factor: R,
     start: usize,
-    out: &'a mut [Node<R>],
+    out: &'a mut [Node<R, H>],
     dot: &'a mut f64,
 }
 
-impl<R: Real> Kernel for AddUp<'_, R> {
+impl<R: Real, const H: usize> Kernel for AddUp<'_, R, H> {
     #[inline(always)]
     fn run<F: Fuse>(self, f: F) {
         for (out, base) in self.out.iter_mut().zip(self.base) {
@@ -123,7 +119,7 @@ impl<R: Real> Kernel for AddUp<'_, R> {
                 let here = &mut self.out[from - self.start..to - self.start];
                 let there = &part.nodes[from - part.start..to - part.start];
                 for (out, node) in here.iter_mut().zip(there) {
-                    out.add(f, R::ONE, &node[0]);
+                    out.add(f, R::ONE, node);
                 }
             }
         }
@@ -132,11 +128,7 @@ impl<R: Real> Kernel for AddUp<'_, R> {
 }
 
 /// The nodes of a part from `start` to `end`.
-pub(crate) fn overlap<R, const N: usize>(
-    part: &Part<R, N>,
-    start: usize,
-    end: usize,
-) -> (usize, usize) {
+pub(crate) fn overlap<T>(part: &Part<T>, start: usize, end: usize) -> (usize, usize) {
     (
         part.start.max(start),
         (part.start + part.nodes.len()).min(end),
@@ -145,12 +137,14 @@ pub(crate) fn overlap<R, const N: usize>(
 
 /// The scalar product, summed in float64.
 #[inline(always)]
-pub(crate) fn dot<R: Real>(a: &[Node<R>], b: &[Node<R>]) -> f64 {
-    let mut sums = [0.0; crate::cell::LANES];
+pub(crate) fn dot<R: Real, const H: usize>(a: &[Node<R, H>], b: &[Node<R, H>]) -> f64 {
+    let mut sums = [[0.0; LANES]; H];
     for (a, b) in a.iter().zip(b) {
-        for l in 0..crate::cell::LANES {
-            sums[l] += a.0[l].wide() * b.0[l].wide();
+        for h in 0..H {
+            for l in 0..LANES {
+                sums[h][l] += a.0[h][l].wide() * b.0[h][l].wide();
+            }
         }
     }
-    sums.iter().sum()
+    sums.as_flattened().iter().sum()
 }

@@ -8,27 +8,19 @@
 //! A step draws its samples by (seed, step) alone, so that a run resumed from any step goes on as it would
 //! have. A zero field is where it starts. The sums are the same on any number of threads.
 
+use std::sync::Arc;
+
 use crate::band;
 use crate::conjugate;
-use crate::ends::{EndTerms, Ends};
 use crate::error::SplineError;
 use crate::field::SplineField;
 use crate::grid::Grid;
+use crate::hop::{Hop, Pass};
 use crate::options::{Options, Weights};
-use crate::prior::PriorTerms;
 use crate::problem::Problem;
 use crate::real::Real;
 use crate::system::System;
-use crate::targets::{Surface, Targets};
-
-/// Points of each shape that decide how many steps a trajectory takes.
-const PROBES: usize = 500;
-
-/// How exactly the ends of trajectories are followed, in the unit of the shapes.
-const EXACT: f64 = 1e-3;
-
-/// The most steps of a trajectory that are chosen.
-const MOST_STEPS: usize = 24;
+use crate::targets::Surface;
 
 /// The terms of the objective at the present field, without their weights.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -77,11 +69,7 @@ pub struct StepReport {
 
 /// Finds a field by Gauss-Newton steps.
 pub struct Solver<R: Real = f32> {
-    problem: Problem,
-    /// For the band, in the order of cells.
-    clouds: [Vec<[R; 3]>; 2],
-    surfaces: [Surface; 2],
-    weights: Weights,
+    hop: Hop<R>,
     options: Options,
     grid: Grid<R>,
     field: SplineField<R>,
@@ -105,16 +93,19 @@ impl<R: Real> Solver<R> {
         let [first, second] = &problem.shapes;
         let (first, second) = rayon::join(|| Surface::new(first), || Surface::new(second));
         let of = |x: f32| R::of(f64::from(x));
-        let cloud = |which: usize| -> Vec<[R; 3]> {
-            let points = &problem.shapes[which].points;
-            band::by_cell(points.iter().map(|point| point.map(of)).collect(), &finest)
+        let cloud = |which: usize| {
+            let points = problem.shapes[which].points.iter();
+            let points = points.map(|point| point.map(of)).collect();
+            Arc::new(band::by_cell(points, &finest))
         };
         Ok(Self {
-            clouds: [cloud(0), cloud(1)],
-            surfaces: [first, second],
+            hop: Hop {
+                clouds: [cloud(0), cloud(1)],
+                surfaces: [Arc::new(first), Arc::new(second)],
+                problem,
+                weights,
+            },
             field: SplineField::zero(grid, options.time),
-            problem,
-            weights,
             options,
             grid,
         })
@@ -137,7 +128,7 @@ impl<R: Real> Solver<R> {
 
     /// The weights.
     pub fn weights(&self) -> &Weights {
-        &self.weights
+        &self.hop.weights
     }
 
     /// Goes on from the field that the steps before `step` left: [`Self::advance`] of `step` is next.
@@ -183,7 +174,7 @@ impl<R: Real> Solver<R> {
         })?;
         let mut size = 0.0f64;
         for (node, change) in field.nodes.iter_mut().zip(&change) {
-            for (value, change) in node.0.iter_mut().zip(change.0) {
+            for (value, &change) in node.flat_mut().iter_mut().zip(change.flat()) {
                 *value += change;
                 size = size.max(change.wide().abs());
             }
@@ -200,23 +191,8 @@ impl<R: Real> Solver<R> {
             terms,
             iterations,
             size,
-            band: system.priors.places.len(),
+            band: system.terms.priors.places.len(),
         })
-    }
-
-    /// Steps of the trajectories through a field.
-    pub(crate) fn trajectory_steps(&self, field: &SplineField<R>) -> usize {
-        let probes = [0, 1].map(|end| {
-            let cloud: &Vec<[R; 3]> = &self.clouds[end];
-            let apart = cloud.len().div_ceil(PROBES);
-            cloud.iter().step_by(apart).copied().collect::<Vec<_>>()
-        });
-        let least = self.options.trajectory_steps;
-        field.steps_within(
-            [&probes[0], &probes[1]],
-            EXACT,
-            [least, MOST_STEPS.max(least)],
-        )
     }
 
     /// The field before a step, on the grid of the step, and its level.
@@ -247,8 +223,8 @@ impl<R: Real> Solver<R> {
     }
 
     /// What was given.
-    pub(crate) fn given(&self) -> (&Problem, &[Surface; 2], &[Vec<[R; 3]>; 2]) {
-        (&self.problem, &self.surfaces, &self.clouds)
+    pub(crate) fn hop(&self) -> &Hop<R> {
+        &self.hop
     }
 
     /// The system at a field; `merge`: with places of trajectories merged.
@@ -259,39 +235,16 @@ impl<R: Real> Solver<R> {
         step: usize,
         merge: bool,
     ) -> Result<(System<R>, Terms), SplineError> {
-        let not_finite = |what| SplineError::NotFinite { step, what };
-        let (options, weights) = (&self.options, &self.weights);
-        let targets = Targets::new(&self.problem, options, weights, step);
-        let steps = self.trajectory_steps(field);
-        let ends = Ends::new(field, &targets.starts, &targets.times, steps, merge);
-        let finite = |x: &R| x.wide().is_finite();
-        if !ends.points.iter().flatten().all(finite) {
-            return Err(not_finite("the end of a trajectory"));
-        }
-        let residuals = targets.residuals(&ends, &self.surfaces, weights, options.robust_scale);
-        let mut terms = Terms {
-            matching: residuals.matching,
-            on_surface: residuals.on_surface,
-            ..Terms::default()
+        let options = &self.options;
+        let pass = Pass {
+            step,
+            draw: step,
+            level,
+            merge,
         };
-        let end_terms = EndTerms::new(field, &ends, residuals.residuals, residuals.weights);
-
-        let amount = [options.band_at(level), steps];
-        let samples = band::samples(field, &self.clouds, options, amount, step);
-        let finite = |x: &R| x.wide().is_finite();
-        if !samples.iter().flat_map(|sample| &sample.point).all(finite) {
-            return Err(not_finite("a point of the band"));
-        }
-        let priors = PriorTerms::new(field, &samples, weights);
-        terms.strain = priors.means.strain;
-        terms.divergence = priors.means.divergence;
-        terms.screw = priors.means.screw;
-        let objective = terms.weighted(weights);
-        if !objective.is_finite() {
-            return Err(not_finite("the objective"));
-        }
+        let (terms, means) = self.hop.linearise(field, options, pass)?;
         // A well-covered node has about 1/150 of the strain, over a squared spacing near 0.1 squared.
-        let ridge = options.ridge * weights.strain * 100.0 / 150.0;
-        Ok((System::new(field, end_terms, priors, ridge), terms))
+        let ridge = options.ridge * self.hop.weights.strain * 100.0 / 150.0;
+        Ok((System::new(field, terms, ridge), means))
     }
 }

@@ -4,6 +4,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, UnitSphere};
 
+use crate::frozen::{Frozen, half_squares};
+use crate::hop::Pass;
 use crate::real::Real;
 use crate::{
     Cloud, Options, Pairs, Problem, Solver, SplineError, SplineField, StepReport, TimeBasis,
@@ -11,7 +13,7 @@ use crate::{
 };
 
 /// A sphere of area 1 and an ellipsoid about as large; pairs by the affine map between them.
-fn ellipsoid(count: usize, pairs: usize) -> Problem {
+pub(crate) fn ellipsoid(count: usize, pairs: usize) -> Problem {
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     let radius = 0.282;
     let axes = [1.4, 0.9, 0.8];
@@ -50,7 +52,7 @@ fn ellipsoid(count: usize, pairs: usize) -> Problem {
 }
 
 /// Steps and samples of a quick run.
-fn quick() -> Options {
+pub(crate) fn quick() -> Options {
     Options {
         steps: vec![3, 2],
         band: 3000,
@@ -92,16 +94,24 @@ fn the_gradient_is_that_of_the_objective() {
     let field = solver.field().clone();
     let mut rng = ChaCha8Rng::seed_from_u64(4);
     let mut direction = field.clone();
-    for value in direction.nodes.iter_mut().flat_map(|node| &mut node.0) {
+    for value in direction.nodes.iter_mut().flat_map(|node| &mut node.0[0]) {
         *value = rng.random_range(-1.0..1.0);
     }
     // Idle lanes belong to no coefficient.
     let direction =
         SplineField::from_parts(*field.grid(), TimeBasis::Linear, &direction.coefficients());
     let direction = direction.expect("finite").nodes;
-    let frozen = solver.frozen(&field, 0, 2).expect("finite");
-    let slope: f64 = (frozen.gradient.iter().zip(&direction))
-        .flat_map(|(g, d)| g.0.into_iter().zip(d.0))
+    let pass = Pass {
+        step: 2,
+        draw: 2,
+        level: 0,
+        merge: false,
+    };
+    let frozen = Frozen::new(solver.hop(), &field, solver.options(), pass);
+    let (mut system, _) = solver.linearise(&field, 0, 2, false).expect("finite");
+    let (ridge, gradient) = (system.ridge(), system.gradient(&field));
+    let slope: f64 = (gradient.iter().zip(&direction))
+        .flat_map(|(g, d)| g.0[0].into_iter().zip(d.0[0]))
         .map(|(g, d)| g * d)
         .sum();
     let objective = |by: f64| {
@@ -109,7 +119,8 @@ fn the_gradient_is_that_of_the_objective() {
         for (node, direction) in moved.nodes.iter_mut().zip(&direction) {
             node.add_plain(by, direction);
         }
-        frozen.objective(&solver, &moved)
+        frozen.objective(solver.hop(), &moved, solver.options())
+            + ridge * half_squares(&moved.nodes)
     };
     let e = 1e-5;
     let difference = (objective(e) - objective(-e)) / (2.0 * e);

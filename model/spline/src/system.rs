@@ -1,43 +1,73 @@
 //! The Gauss-Newton system of one step: products with its matrix, never assembled, and its gradient.
 
 use crate::cell::Node;
+use crate::conjugate::Linear;
 use crate::ends::EndTerms;
 use crate::field::SplineField;
-use crate::preconditioner::Preconditioner;
+use crate::preconditioner::{NodeBlocks, Preconditioner};
 use crate::prior::PriorTerms;
-use crate::real::Real;
-use crate::scatter::add_up;
+use crate::real::{Fuse, Real};
+use crate::scatter::{BLOCK, add_up};
 
-/// The terms, a ridge and the preconditioner.
-pub(crate) struct System<R: Real> {
-    pub ends: EndTerms<R>,
-    pub priors: PriorTerms<R>,
-    preconditioner: Preconditioner<R>,
-    ridge: R,
+/// The terms of one hop from a shape to the next.
+pub(crate) struct HopTerms<R: Real, const H: usize> {
+    pub ends: EndTerms<R, H>,
+    pub priors: PriorTerms<R, H>,
     strides: [usize; 2],
 }
 
-impl<R: Real> System<R> {
-    pub(crate) fn new(
-        field: &SplineField<R>,
-        ends: EndTerms<R>,
-        priors: PriorTerms<R>,
-        ridge: f64,
-    ) -> Self {
-        let strides = field.grid().strides();
-        let rates = field.time_basis().rates();
-        let nodes = field.nodes.len();
+impl<R: Real, const H: usize> HopTerms<R, H> {
+    pub(crate) fn new(ends: EndTerms<R, H>, priors: PriorTerms<R, H>, strides: [usize; 2]) -> Self {
         Self {
-            preconditioner: Preconditioner::new(&ends, &priors, ridge, nodes, strides, rates),
             ends,
             priors,
-            ridge: R::of(ridge),
             strides,
         }
     }
 
-    pub(crate) fn preconditioner(&self) -> &Preconditioner<R> {
-        &self.preconditioner
+    /// The diagonal blocks of the matrix, `P` sums for each node.
+    pub(crate) fn blocks<const P: usize>(&self) -> NodeBlocks<R, P> {
+        NodeBlocks::new(&self.ends, &self.priors, self.strides)
+    }
+
+    /// The gradient of the objective by the coefficients, and `ridge nodes`.
+    pub(crate) fn gradient(&mut self, nodes: &[Node<R, H>], ridge: R, out: &mut [Node<R, H>]) {
+        let (ends, priors, strides) = (&mut self.ends, &mut self.priors, self.strides);
+        rayon::join(
+            || ends.spread_residuals(strides),
+            || priors.spread_gradient(strides),
+        );
+        add_up(&[ends.parts(), priors.parts()], nodes, ridge, out);
+    }
+
+    /// `q = A p + ridge p`; gives `p . q`.
+    pub(crate) fn product(&mut self, p: &[Node<R, H>], ridge: R, q: &mut [Node<R, H>]) -> f64 {
+        let (ends, priors, strides) = (&mut self.ends, &mut self.priors, self.strides);
+        rayon::join(
+            || {
+                ends.move_ends(p, strides);
+                ends.spread_moves(strides);
+            },
+            || priors.spread_product(p, strides),
+        );
+        add_up(&[ends.parts(), priors.parts()], p, ridge, q)
+    }
+}
+
+/// The terms of one hop, a ridge and the preconditioner.
+pub(crate) struct System<R: Real> {
+    pub terms: HopTerms<R, 1>,
+    preconditioner: Preconditioner<R>,
+    ridge: R,
+}
+
+impl<R: Real> System<R> {
+    pub(crate) fn new(field: &SplineField<R>, terms: HopTerms<R, 1>, ridge: f64) -> Self {
+        Self {
+            preconditioner: Preconditioner::new(&terms.blocks(), ridge, field.nodes.len()),
+            terms,
+            ridge: R::of(ridge),
+        }
     }
 
     /// The weight of half the squares of the coefficients.
@@ -48,27 +78,23 @@ impl<R: Real> System<R> {
 
     /// The gradient of the objective by the coefficients.
     pub(crate) fn gradient(&mut self, field: &SplineField<R>) -> Vec<Node<R>> {
-        let (ends, priors, strides) = (&mut self.ends, &mut self.priors, self.strides);
-        rayon::join(
-            || ends.spread_residuals(strides),
-            || priors.spread_gradient(strides),
-        );
         let mut out = vec![Node::ZERO; field.nodes.len()];
-        let parts = [self.ends.parts(), self.priors.parts()];
-        add_up(&parts, &field.nodes, self.ridge, &mut out);
+        self.terms.gradient(&field.nodes, self.ridge, &mut out);
         out
     }
+}
 
-    /// `q = A p`; gives `p . q`.
-    pub(crate) fn product(&mut self, p: &[Node<R>], q: &mut [Node<R>]) -> f64 {
-        let (ends, priors, strides) = (&mut self.ends, &mut self.priors, self.strides);
-        rayon::join(
-            || {
-                ends.move_ends(p, strides);
-                ends.spread_moves(strides);
-            },
-            || priors.spread_product(p, strides),
-        );
-        add_up(&[self.ends.parts(), self.priors.parts()], p, self.ridge, q)
+impl<R: Real> Linear<R> for System<R> {
+    fn block(&self) -> usize {
+        BLOCK
+    }
+
+    fn product(&mut self, p: &[Node<R>], q: &mut [Node<R>]) -> f64 {
+        self.terms.product(p, self.ridge, q)
+    }
+
+    #[inline(always)]
+    fn precondition<F: Fuse>(&self, f: F, start: usize, r: &[Node<R>], out: &mut [Node<R>]) {
+        self.preconditioner.apply(f, start, r, out);
     }
 }

@@ -11,6 +11,8 @@
 //! a front does not stick to a back. What arrives at the border of what is known of the other surface has no weight: it
 //! may have no counterpart there.
 
+use std::sync::Arc;
+
 use kiddo::SquaredEuclidean;
 use kiddo::immutable::float::kdtree::ImmutableKdTree;
 use rand::seq::index;
@@ -131,7 +133,7 @@ impl<R: Real> Targets<R> {
     pub(crate) fn arrivals(
         &self,
         ends: &Ends<R>,
-        surfaces: &[Surface; 2],
+        surfaces: &[Arc<Surface>; 2],
     ) -> (Vec<Arrival<R>>, Vec<Arrival<R>>) {
         let count = self.goals.len();
         let arrival = |at: usize, place, normal, factor| Arrival {
@@ -159,7 +161,7 @@ impl<R: Real> Targets<R> {
     pub(crate) fn planes(
         &self,
         ends: &Ends<R>,
-        surfaces: &[Surface; 2],
+        surfaces: &[Arc<Surface>; 2],
     ) -> Vec<([f64; 3], [f64; 3], f64)> {
         let (_, surface) = self.arrivals(ends, surfaces);
         let plane = |at: Arrival<R>| (at.place, at.normal.expect("normals"), at.factor);
@@ -177,7 +179,7 @@ impl<R: Real> Targets<R> {
     pub(crate) fn residuals(
         &self,
         ends: &Ends<R>,
-        surfaces: &[Surface; 2],
+        surfaces: &[Arc<Surface>; 2],
         weights: &Weights,
         scale: f64,
     ) -> Residuals<R> {
@@ -237,7 +239,7 @@ impl Found {
     fn new<R: Real>(
         end: [f64; 3],
         gradient: &Matrix<R>,
-        surfaces: &[Surface; 2],
+        surfaces: &[Arc<Surface>; 2],
         from: usize,
         at: usize,
     ) -> Self {

@@ -20,10 +20,10 @@ pub(crate) type Matrix<R> = [[R; 3]; 3];
 
 /// What a trajectory goes through.
 #[derive(Clone, Copy)]
-pub(crate) struct Flow<'a, R: Real> {
+pub(crate) struct Flow<'a, R: Real, const H: usize> {
     pub grid: &'a Grid<R>,
     pub strides: [usize; 2],
-    pub nodes: &'a [Node<R>],
+    pub nodes: &'a [Node<R, H>],
     pub basis: TimeBasis,
 }
 
@@ -65,7 +65,7 @@ fn add_product<R: Real>(c: &mut Matrix<R>, factor: R, a: &Matrix<R>, b: &Matrix<
     }
 }
 
-impl<R: Real> Flow<'_, R> {
+impl<R: Real, const H: usize> Flow<'_, R, H> {
     #[inline(always)]
     fn value<F: Fuse>(&self, f: F, x: Lanes<R>, t: R) -> Lanes<R> {
         let place = self.grid.locate(first_three(x));
@@ -84,8 +84,8 @@ impl<R: Real> Flow<'_, R> {
     #[inline(always)]
     pub(crate) fn jet<F: Fuse>(&self, f: F, x: [R; 3], t: R) -> Jet<R> {
         let place = self.grid.locate(x);
-        let (time, rates) = (self.basis.values(t), self.basis.rates());
-        jet(f, self.nodes, self.strides, &place, time, rates).narrow()
+        let times = [self.basis.values(t), self.basis.rates(t)];
+        jet(f, self.nodes, self.strides, &place, times).narrow()
     }
 
     /// Where a point is carried.

@@ -56,6 +56,7 @@ pub(super) static EIGENBASIS: MethodSpec = MethodSpec {
     fixed: &[("eigenbasis.modes", "a fitted flow cannot change its basis")],
     // Coefficients of one size each: the steps can be larger than a network's.
     changes: &["training.velocity-learning-rate=1e-2"],
+    many: &[],
 };
 
 section! {

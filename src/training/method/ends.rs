@@ -37,6 +37,7 @@ pub(super) static MLP: MethodSpec = MethodSpec {
     own: None,
     fixed: &[],
     changes: &SOFT,
+    many: &[],
 };
 
 /// `sdf-blend`.
@@ -52,6 +53,7 @@ pub(super) static SDF_BLEND: MethodSpec = MethodSpec {
     own: None,
     fixed: &[],
     changes: &SOFT,
+    many: &[],
 };
 
 /// `lipmlp`.
@@ -93,6 +95,7 @@ pub(super) static LIPMLP: MethodSpec = MethodSpec {
         "a trained network cannot change its input",
     )],
     changes: &["training.learning-rate=2e-3"],
+    many: &[],
 };
 
 section! {

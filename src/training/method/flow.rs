@@ -49,6 +49,7 @@ pub(super) static FLOW: MethodSpec = MethodSpec {
     own: None,
     fixed: &FIXED_OPTIMISER,
     changes: &[],
+    many: &[],
 };
 
 /// Whether V learns from a guide in step `step` of the recipe.

@@ -40,6 +40,7 @@ pub(super) static NETWORK: MethodSpec = MethodSpec {
     own: None,
     fixed: &FIXED_OPTIMISER,
     changes: &[],
+    many: &[],
 };
 
 /// The two networks and how they are trained.

@@ -63,6 +63,7 @@ pub(super) static NFGP: MethodSpec = MethodSpec {
     ],
     // Its normalised layers learn slowly.
     changes: &["training.velocity-learning-rate=3e-3"],
+    many: &[],
 };
 
 const SHARED_OUT: &str = "the method trains one deformation after the other and shares its steps out \

@@ -41,6 +41,7 @@ pub(super) static NISE: MethodSpec = MethodSpec {
     own: Some(NiseKeys::SECTION),
     fixed: &FIXED,
     changes: &CHANGES,
+    many: &[],
 };
 
 /// `nise-velocity`.
@@ -56,6 +57,7 @@ pub(super) static NISE_VELOCITY: MethodSpec = MethodSpec {
     own: Some(NiseKeys::SECTION),
     fixed: &FIXED,
     changes: &CHANGES,
+    many: &[],
 };
 
 section! {

@@ -28,6 +28,8 @@ pub struct MethodSpec {
     pub(crate) fixed: &'static [(&'static str, &'static str)],
     /// What a comparison changes for it in the preset `quick`, beside the method itself.
     pub(crate) changes: &'static [&'static str],
+    /// Values that keys have in every preset where there are more than two key frames.
+    pub(crate) many: &'static [&'static str],
 }
 
 /// What a method cannot do without.

@@ -47,6 +47,18 @@ pub(super) static SPLINE: MethodSpec = MethodSpec {
     ],
     // Presets of networks have far more steps.
     changes: &["training.steps=18"],
+    // The mean interval is the unit of time of these weights.
+    many: &[
+        "loss.strain=1.0",
+        "loss.divergence=1.0",
+        "loss.screw=10.0",
+        "training.steps=10",
+        "training.time-steps=1",
+        "training.band-widths=[0.005, 0.02]",
+        "spline.spacing=0.07",
+        "spline.coarse-shares=[0.5]",
+        "spline.band=4000",
+    ],
 };
 
 section! {

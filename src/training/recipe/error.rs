@@ -111,11 +111,13 @@ pub enum RecipeError {
     },
     /// Key frames that can be written, but not yet trained on.
     #[error(
-        "{at}: training on more than two key frames is not possible yet; give source and target"
+        "{at}: networks are trained on two key frames, not {keys}; for more, set preset = \"instant\""
     )]
-    NotYet {
+    ManyKeyFrames {
         /// File and line, or override.
         at: String,
+        /// How many there are.
+        keys: usize,
     },
     /// A key without which no recipe works.
     #[error("{}: {key} is missing ({allowed}); add it under {header}", path.display())]

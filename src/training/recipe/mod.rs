@@ -43,6 +43,7 @@ mod consistency;
 mod data;
 mod entry;
 mod error;
+mod fallback;
 mod frames;
 mod init;
 mod keys;

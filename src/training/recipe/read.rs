@@ -6,6 +6,7 @@ use std::path::Path;
 use super::data::{DataRecipe, KEYFRAME};
 use super::entry::{Entries, Entry, Place, keyframe_id};
 use super::error::RecipeError;
+use super::fallback::Fallback;
 use super::frames::Frames;
 use super::keys::{DataKeys, PRESET};
 use super::rule::Value;
@@ -14,7 +15,8 @@ use super::setting::Setting;
 use super::source::Reading;
 use super::words::{GeometryKind, Preset, VelocityKind};
 use super::{MethodRecipe, Recipe, acting, catalogue, consistency, frames, old, source};
-use crate::method::{self, MethodSpec};
+use crate::method::spline::is_solved;
+use crate::method::{self, MethodSpec, spec_of};
 
 impl Recipe {
     /// Reads the recipe at `path`; `overrides` are the arguments of `--set`, of which later ones
@@ -45,10 +47,7 @@ impl Recipe {
         source::make_paths_absolute(&mut entries, origin.parent().unwrap_or(Path::new("")))?;
         let at = frames::place(&entries);
         let recipe = resolve(entries, origin, None)?;
-        if !recipe.data.is_pair() {
-            let at = at.unwrap_or_else(|| origin.display().to_string());
-            return Err(RecipeError::NotYet { at });
-        }
+        recipe.trainable(|| at.unwrap_or_else(|| origin.display().to_string()))?;
         Ok(recipe)
     }
 
@@ -65,6 +64,26 @@ impl Recipe {
         source::make_paths_absolute(&mut entries, origin.parent().unwrap_or(Path::new("")))?;
         let recipe = resolve(entries, origin, Some(&mut notes))?;
         Ok((recipe, notes))
+    }
+
+    /// The preset "instant" through three or more shapes, at the times 0, 1, 2 and so on.
+    ///
+    /// # Errors
+    /// If there are fewer than two shapes, a path is not Unicode, or cannot be made absolute.
+    pub fn through(shapes: &[impl AsRef<Path>]) -> Result<Recipe, RecipeError> {
+        let mut entries = Entries::new();
+        let instant = Preset::Instant.to_value().expect("a word");
+        entries.insert(PRESET.id(), Entry::new(&PRESET, instant, Place::Held));
+        for (index, path) in shapes.iter().enumerate() {
+            let file = Value::Text(source::unicode(path.as_ref())?.to_owned());
+            let values = [file, Value::Number(index as f64)];
+            for (key, value) in KEYFRAME.iter().zip(values) {
+                let entry = Entry::new(key, value, Place::Held);
+                entries.insert(keyframe_id(index, key), entry);
+            }
+        }
+        source::make_paths_absolute(&mut entries, Path::new(""))?;
+        resolve(entries, Path::new("recipe"), None)
     }
 
     /// The preset "default" between two shapes, their paths made absolute.
@@ -108,17 +127,28 @@ impl Recipe {
             source::read_override(given, &mut entries)?;
         }
         source::make_paths_absolute(&mut entries, Path::new(""))?;
-        *self = resolve(entries, Path::new("recipe"), None)?;
+        let changed = resolve(entries, Path::new("recipe"), None)?;
+        changed.trainable(|| "the recipe".to_owned())?;
+        *self = changed;
         Ok(())
+    }
+
+    /// Whether its method can be trained on so many key frames; `at`: where they are named.
+    fn trainable(&self, at: impl FnOnce() -> String) -> Result<(), RecipeError> {
+        let keys = self.data.keyframes.len();
+        if keys == 2 || is_solved(self) {
+            return Ok(());
+        }
+        Err(RecipeError::ManyKeyFrames { at: at(), keys })
     }
 
     /// Everything that the recipe says. What has the preset's value is the preset's, so that another preset
     /// brings its own.
     fn held(&self) -> Entries {
         let held = |key, value| Entry::new(key, value, Place::Held);
-        let own = |(key, value): &(&'static Key, Value)| {
-            key.preset_value(self.preset).as_ref() != Some(value)
-        };
+        let fallback = Fallback::new(self.preset, spec_of(self), self.data.keyframes.len());
+        let own =
+            |(key, value): &(&'static Key, Value)| fallback.value(key).as_ref() != Some(value);
         let values = self.acting().into_iter().filter(own);
         let mut entries: Entries = values
             .map(|(key, value)| (key.id(), held(key, value)))
@@ -154,10 +184,11 @@ fn resolve(
         }
     }
     let frames = frames::read(&entries, origin)?;
+    let fallback = Fallback::new(preset, spec, frames.0.len());
     for key in catalogue::keys().filter(|key| spec.acts_on(key)) {
-        if let Some(value) = key.preset_value(preset) {
-            let fallback = Entry::new(key, value, Place::Preset(preset));
-            entries.entry(key.id()).or_insert(fallback);
+        if let Some(value) = fallback.value(key) {
+            let left_out = Entry::new(key, value, fallback.place());
+            entries.entry(key.id()).or_insert(left_out);
         }
     }
     consistency::check(&entries, spec, &frames.1)?;

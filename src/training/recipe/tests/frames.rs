@@ -92,7 +92,7 @@ fn a_sequence_has_the_frames_that_are_its_key_frames() {
 #[test]
 fn training_on_them_is_refused_in_one_place() {
     let refused =
-        "training on more than two key frames is not possible yet; give source and target";
+        "networks are trained on two key frames, not 3; for more, set preset = \"instant\"";
     assert_eq!(message(THREE), format!("recipe.toml:6: {refused}"));
     assert_eq!(message(SEQUENCE), format!("recipe.toml:2: {refused}"));
 }

@@ -1,0 +1,185 @@
+//! A velocity field through many key frames, and its part between two of them.
+
+use crate::basis::TimeBasis;
+use crate::cell::Node;
+use crate::error::SplineError;
+use crate::field::{SplineField, refine};
+use crate::grid::Grid;
+use crate::real::Real;
+use crate::sequence::lengths;
+
+/// Functions of time that act between two key frames.
+pub(super) const ACTING: usize = 3;
+
+/// A velocity field of quadratic B-splines in space and in time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SequenceField<R: Real = f32> {
+    grid: Grid<R>,
+    times: Vec<f64>,
+    /// For each node in turn its functions of time, two in each entry.
+    pub(super) nodes: Vec<Node<R>>,
+}
+
+/// Where function `k` of a node is: its entry, and the first of its lanes there.
+#[inline(always)]
+pub(super) fn place(k: usize) -> (usize, usize) {
+    (k / 2, 4 * (k % 2))
+}
+
+impl<R: Real> SequenceField<R> {
+    /// The field that is zero everywhere, through key frames at these ascending times.
+    pub(super) fn zero(grid: Grid<R>, times: Vec<f64>) -> Self {
+        let entries = (times.len() + 1).div_ceil(2);
+        let nodes = vec![Node::ZERO; grid.size() * entries];
+        Self { grid, times, nodes }
+    }
+
+    /// The field of these coefficients, as [`Self::coefficients`] gives them.
+    ///
+    /// # Errors
+    /// If the grid is none, times do not ascend, or the coefficients are not finite or not as many as the
+    /// grid's.
+    pub fn from_parts(
+        grid: Grid<R>,
+        times: Vec<f64>,
+        coefficients: &[R],
+    ) -> Result<Self, SplineError> {
+        let ascend = times.windows(2).all(|two| two[0] < two[1]);
+        if times.len() < 2 || !ascend || times.iter().any(|time| !time.is_finite()) {
+            return Err(SplineError::Option {
+                name: "times",
+                value: times.first().copied().unwrap_or(f64::NAN),
+                allowed: "two or more, ascending",
+            });
+        }
+        let grid = grid.checked()?;
+        let functions = times.len() + 1;
+        let wanted = grid.size() as f64 * functions as f64 * 3.0;
+        if coefficients.len() as f64 != wanted {
+            return Err(SplineError::Lengths {
+                what: "coefficients",
+                found: coefficients.len(),
+                wanted: wanted as usize,
+            });
+        }
+        if let Some(index) = coefficients.iter().position(|c| !c.wide().is_finite()) {
+            return Err(SplineError::Input {
+                what: "coefficient",
+                index,
+                found: format!("{:?}", coefficients[index]),
+                also: "",
+            });
+        }
+        let mut out = Self::zero(grid, times);
+        let entries = out.entries();
+        let each = coefficients.chunks_exact(3 * functions);
+        for (node, values) in out.nodes.chunks_exact_mut(entries).zip(each) {
+            for (k, vector) in values.chunks_exact(3).enumerate() {
+                let (entry, lane) = place(k);
+                node[entry].0[0][lane..lane + 3].copy_from_slice(vector);
+            }
+        }
+        Ok(out)
+    }
+
+    /// The grid.
+    pub fn grid(&self) -> &Grid<R> {
+        &self.grid
+    }
+
+    /// The times of the key frames.
+    pub fn times(&self) -> &[f64] {
+        &self.times
+    }
+
+    /// Functions of time: one more than key frames.
+    pub fn functions(&self) -> usize {
+        self.times.len() + 1
+    }
+
+    /// Entries of each node.
+    pub(super) fn entries(&self) -> usize {
+        self.functions().div_ceil(2)
+    }
+
+    /// The coefficients, `[nodes x, nodes y, nodes z, functions of time, 3]`.
+    pub fn coefficients(&self) -> Vec<R> {
+        let (functions, entries) = (self.functions(), self.entries());
+        let mut out = Vec::with_capacity(self.grid.size() * functions * 3);
+        for node in self.nodes.chunks_exact(entries) {
+            for k in 0..functions {
+                let (entry, lane) = place(k);
+                out.extend_from_slice(&node[entry].0[0][lane..lane + 3]);
+            }
+        }
+        out
+    }
+
+    /// The part from key frame `s` to the next: the velocity per length of that interval, over a time from 0
+    /// to 1.
+    ///
+    /// # Panics
+    /// If there is no such interval.
+    pub fn part(&self, s: usize) -> SplineField<R, 2> {
+        let mut out = SplineField::zero(self.grid, self.basis(s));
+        self.take(&self.nodes, s, &mut out.nodes);
+        out
+    }
+
+    /// The functions that act from key frame `s` to the next, in a time from 0 to 1 there.
+    fn basis(&self, s: usize) -> TimeBasis {
+        let lengths = lengths(&self.times);
+        let h = lengths[s];
+        let before = if s == 0 { h } else { lengths[s - 1] };
+        let after = lengths.get(s + 1).copied().unwrap_or(h);
+        // De Boor's recursion, with the first and the last interval repeated beyond the ends.
+        let (a, b) = (h / (before + h), h / (h + after));
+        let functions = [[a, -2.0 * a, a], [1.0 - a, 2.0 * a, -a - b], [0.0, 0.0, b]];
+        TimeBasis::Quadratic(functions.map(|function| function.map(|x| x * h)))
+    }
+
+    /// What of a vector like the coefficients acts from key frame `s` to the next.
+    pub(super) fn take(&self, vector: &[Node<R>], s: usize, out: &mut [Node<R, 2>]) {
+        take(vector, self.entries(), s, out);
+    }
+
+    /// Adds a change to the coefficients; its largest number.
+    pub(super) fn add(&mut self, change: &[Node<R>]) -> f64 {
+        let mut size = 0.0f64;
+        for (node, change) in self.nodes.iter_mut().zip(change) {
+            for (value, &change) in node.flat_mut().iter_mut().zip(change.flat()) {
+                *value += change;
+                size = size.max(change.wide().abs());
+            }
+        }
+        size
+    }
+
+    /// Whether all coefficients are finite.
+    pub(super) fn is_finite(&self) -> bool {
+        let finite = |node: &Node<R>| node.flat().iter().all(|c| c.wide().is_finite());
+        self.nodes.iter().all(finite)
+    }
+
+    /// The same field on a grid of half the spacing.
+    ///
+    /// # Errors
+    /// If that grid has too many nodes.
+    pub fn refined(&self) -> Result<Self, SplineError> {
+        let mut out = Self::zero(self.grid.halved()?, self.times.clone());
+        let (entries, finer) = (self.entries(), out.grid);
+        refine(&self.grid, &self.nodes, entries, &finer, &mut out.nodes);
+        Ok(out)
+    }
+}
+
+/// What of a vector acts from key frame `s` to the next.
+pub(super) fn take<R: Real>(vector: &[Node<R>], entries: usize, s: usize, out: &mut [Node<R, 2>]) {
+    for (node, out) in vector.chunks_exact(entries).zip(out) {
+        for j in 0..ACTING {
+            let (entry, lane) = place(s + j);
+            let to = 4 * (j % 2);
+            out.0[j / 2][to..to + 4].copy_from_slice(&node[entry].0[0][lane..lane + 4]);
+        }
+    }
+}

@@ -1,0 +1,122 @@
+//! What the solver takes, of a recipe and its key frames.
+
+use isomorph_spline::{
+    Cloud, Options, Pairs, Problem, SequenceProblem, SequenceSolver, Solver, SplineError,
+    TimeBasis, Weights,
+};
+use isomorph_training::method::spline;
+
+use super::motion::AnySolver;
+use crate::recipe::Recipe;
+use crate::shape::Keyframes;
+
+/// Least weight of the strain: without any the field would be free between the samples.
+const LEAST_STRAIN: f64 = 1e-3;
+
+/// The solver of a recipe, before its first step.
+///
+/// # Errors
+/// What the solver refuses.
+pub(super) fn solver(recipe: &Recipe, keyframes: &Keyframes) -> Result<AnySolver, SplineError> {
+    let (weights, options) = (weights(recipe), options(recipe));
+    if keyframes.keys.len() == 2 {
+        let solver = Solver::new(problem(recipe, keyframes), weights, options)?;
+        return Ok(AnySolver::Pair(Box::new(solver)));
+    }
+    let problem = SequenceProblem {
+        shapes: (0..keyframes.keys.len())
+            .map(|k| cloud(keyframes, k))
+            .collect(),
+        times: keyframes.keys.iter().map(|key| key.time).collect(),
+        pairs: (0..keyframes.between.len())
+            .map(|k| pairs(recipe, keyframes, k))
+            .collect(),
+    };
+    let solver = SequenceSolver::new(problem, weights, options)?;
+    Ok(AnySolver::Sequence(Box::new(solver)))
+}
+
+/// The problem of two shapes.
+pub(super) fn problem(recipe: &Recipe, keyframes: &Keyframes) -> Problem {
+    Problem {
+        shapes: [cloud(keyframes, 0), cloud(keyframes, 1)],
+        pairs: pairs(recipe, keyframes, 0),
+    }
+}
+
+fn cloud(keyframes: &Keyframes, k: usize) -> Cloud {
+    let key = &keyframes.keys[k];
+    Cloud {
+        points: key.cloud.points.clone(),
+        normals: key.cloud.normals.clone(),
+        border: key.border.clone(),
+    }
+}
+
+/// The pairs from key frame `k` to the next.
+fn pairs(recipe: &Recipe, keyframes: &Keyframes, k: usize) -> Pairs {
+    // At most so many, evenly chosen: they come in no order that means anything.
+    let known = &keyframes.between[k];
+    let apart = known
+        .len()
+        .div_ceil(recipe.training.correspondence_batch)
+        .max(1);
+    let (source, target) = known.iter().step_by(apart).copied().unzip();
+    let confidence = &keyframes.confidence[k];
+    Pairs {
+        source,
+        target,
+        confidence: confidence.iter().step_by(apart).copied().collect(),
+    }
+}
+
+pub(super) fn weights(recipe: &Recipe) -> Weights {
+    let loss = &recipe.loss;
+    Weights {
+        matching: loss.matching,
+        on_surface: loss.on_surface,
+        strain: loss.strain.max(LEAST_STRAIN),
+        divergence: loss.divergence,
+        screw: loss.screw,
+    }
+}
+
+pub(super) fn options(recipe: &Recipe) -> Options {
+    let (keys, training) = (spline::keys(recipe), &recipe.training);
+    let steps = steps_of_levels(training.steps, &keys.coarse_shares);
+    Options {
+        // Of the first level; each further one halves it.
+        spacing: keys.spacing * 2.0_f64.powi(steps.len() as i32 - 1),
+        steps,
+        time: match recipe.velocity.time_dependent {
+            true => TimeBasis::Linear,
+            false => TimeBasis::Constant,
+        },
+        trajectory_steps: training.time_steps,
+        band: keys.band,
+        band_spread: training.band_widths.clone(),
+        surface_samples: keys.surface_samples,
+        robust_scale: keys.robust,
+        iterations: keys.iterations,
+        tolerance: keys.tolerance,
+        seed: training.seed,
+        ..Options::default()
+    }
+}
+
+/// Steps of each level of the grid, the coarsest first; levels without any are left out.
+fn steps_of_levels(steps: usize, coarse_shares: &[f64]) -> Vec<usize> {
+    let mut left = steps;
+    let mut levels: Vec<usize> = coarse_shares
+        .iter()
+        .map(|share| {
+            // The last level has a step at least.
+            let taken = (left as f64 * share).round().min(left as f64 - 1.0) as usize;
+            left -= taken;
+            taken
+        })
+        .collect();
+    levels.push(left);
+    levels.retain(|steps| *steps > 0);
+    levels
+}
