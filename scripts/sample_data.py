@@ -9,6 +9,8 @@ The same sequences give the same bytes. Layout of .anime: src/formats/anime.rs.
 
 scan/ holds what a scanner gives: clouds of the fox with points that are none.
 
+arms/ holds the key frames of a motion: the same mesh in seven poses, at uneven times.
+
 Per pair: source.ply and target.ply (binary, with faces, without normals) and pairs.csv. The
 sequences are vertex-consistent, which no scan is; so that the files give away no more than
 pairs.csv says, the vertices and the triangles of the target are in a random order of their own.
@@ -145,6 +147,20 @@ def make_scans(folder, sequence):
     print(f"{folder}: two raw scans, and {len(front)} points of a part")
 
 
+# The key frames that the authors of the paper name.
+KEYS = [0, 10, 18, 28, 39, 47, 54]
+
+
+def make_keys(folder, sequence):
+    """Writes key frames: the same mesh in each."""
+    frames, faces = read_sequence(sequence, KEYS)
+    folder.mkdir(parents=True, exist_ok=True)
+    for number, vertices in zip(KEYS, frames):
+        comment = f"{sequence.name} frame {number}, see data/README.md"
+        write_ply(folder / f"key-{number:02}.ply", vertices, faces, comment)
+    print(f"{folder}: {len(KEYS)} key frames of {len(frames[0])} vertices")
+
+
 def main():
     if len(sys.argv) not in (2, 3):
         sys.exit(__doc__)
@@ -153,6 +169,7 @@ def main():
     for name, sequence, first, last in SAMPLES:
         make(data / name, sequences / sequence, first, last)
     make_scans(data / "scan", sequences / "fox_survey.anime")
+    make_keys(data / "arms", sequences / "human_raise_arms.anime")
 
 
 if __name__ == "__main__":

@@ -66,6 +66,7 @@ pub use session::describe::describe;
 pub use session::export::{Exported, export};
 pub use session::extract::{ExtractOptions, even_times};
 pub use session::folder::is_run;
+pub use session::pace::Ease;
 pub use session::report::current_report;
 pub use session::sampled_field::FieldGrid;
 pub use session::stop::StopFlag;
@@ -105,7 +106,9 @@ pub mod normals {
 
 /// Runs held against true frames.
 pub mod evaluation {
-    pub use crate::evaluate::{Compared, Evaluation, FrameResult, GroundTruth, Metrics};
+    pub use crate::evaluate::{
+        Compared, Drift, Evaluation, FrameResult, GroundTruth, KeysEvaluation, Metrics,
+    };
     pub use crate::session::evaluate::EvaluateOptions;
 }
 

@@ -5,7 +5,9 @@ use std::path::PathBuf;
 
 use clap::Args;
 use isomorph::Trained;
-use isomorph::evaluation::{EvaluateOptions, Evaluation, GroundTruth, Metrics};
+use isomorph::evaluation::{
+    Compared, EvaluateOptions, Evaluation, FrameResult, GroundTruth, KeysEvaluation, Metrics,
+};
 
 use super::{BackendArgs, QuietArgs, Result, print, stop_on_interrupt};
 
@@ -27,12 +29,22 @@ pub(super) struct EvaluateArgs {
     ground_truth: PathBuf,
 
     /// Frame that is the run's source, counted from 0
-    #[arg(long, value_name = "FRAME")]
-    from: usize,
+    #[arg(
+        long,
+        value_name = "FRAME",
+        required_unless_present = "keys",
+        requires = "to"
+    )]
+    from: Option<usize>,
 
     /// Frame that is the run's target
-    #[arg(long, value_name = "FRAME")]
-    to: usize,
+    #[arg(long, value_name = "FRAME", requires = "from")]
+    to: Option<usize>,
+
+    /// Frames that are the run's key frames, such as 0,10,18, instead of --from and --to. `natural` then interpolates
+    /// all true vertices by natural cubic splines
+    #[arg(long, value_name = "A,B,C", value_delimiter = ',', conflicts_with_all = ["from", "to"])]
+    keys: Vec<usize>,
 
     #[command(flatten)]
     precision: PrecisionArgs,
@@ -78,9 +90,19 @@ impl PrecisionArgs {
 pub(super) fn run(args: EvaluateArgs) -> Result {
     let trained = Trained::open(&args.run, args.place.backend()?)?;
     let truth = GroundTruth::read(&args.ground_truth).map_err(isomorph::Error::from)?;
-    let (frames, stop) = ([args.from, args.to], stop_on_interrupt());
+    let stop = stop_on_interrupt();
     let mut terminal = args.quiet.terminal(&args.run);
     let options = args.precision.options();
+    let (Some(from), Some(to)) = (args.from, args.to) else {
+        let evaluation = trained.evaluate_keys(&truth, &args.keys, &options, &stop, |event| {
+            terminal.show(event);
+        })?;
+        return match args.json {
+            true => print(&(serde_json::to_string(&evaluation)? + "\n")),
+            false => print(&table_of_keys(&evaluation)),
+        };
+    };
+    let frames = [from, to];
     let evaluation = trained.evaluate(&truth, frames, &options, &stop, |event| {
         terminal.show(event);
     })?;
@@ -91,58 +113,99 @@ pub(super) fn run(args: EvaluateArgs) -> Result {
     }
 }
 
-/// The means, one line per thing measured.
-fn table(evaluation: &Evaluation, [from, to]: [usize; 2]) -> String {
-    let mean = &evaluation.mean;
-    let mut table = format!(
-        "mean over {} frames between {from} and {to}; lengths in normalised units\n",
-        evaluation.frames.len(),
-    );
-    // Writing to a string does not fail.
-    let _ = writeln!(
-        table,
-        "{:18} {:>9} {:>9} {:>9} {:>9} {:>8} {:>8} {:>6} {:>9}",
+/// The names of the columns.
+fn header() -> String {
+    format!(
+        "{:18} {:>9} {:>9} {:>9} {:>9} {:>8} {:>8} {:>6} {:>9}\n",
         "", "CD x10^3", "CD", "HD", "HD95", "normals", "volume", "pieces", "tracked"
-    );
-    let mut line = |name: &str, metrics: &Metrics| {
-        let tracked = metrics
-            .tracked_rmse
-            .map_or_else(|| "-".to_owned(), |rmse| format!("{rmse:.5}"));
-        let _ = writeln!(
-            table,
-            "{name:18} {:9.4} {:9.5} {:9.4} {:9.5} {:8.4} {:8.4} {:6.2} {tracked:>9}",
-            1e3 * metrics.chamfer_squared,
-            metrics.chamfer,
-            metrics.hausdorff,
-            metrics.hausdorff95,
-            metrics.normal_consistency,
-            metrics.volume_ratio,
-            metrics.components,
-        );
-    };
+    )
+}
+
+/// One line of numbers.
+fn line(name: &str, metrics: &Metrics) -> String {
+    let tracked = metrics
+        .tracked_rmse
+        .map_or_else(|| "-".to_owned(), |rmse| format!("{rmse:.5}"));
+    format!(
+        "{name:18} {:9.4} {:9.5} {:9.4} {:9.5} {:8.4} {:8.4} {:6.2} {tracked:>9}\n",
+        1e3 * metrics.chamfer_squared,
+        metrics.chamfer,
+        metrics.hausdorff,
+        metrics.hausdorff95,
+        metrics.normal_consistency,
+        metrics.volume_ratio,
+        metrics.components,
+    )
+}
+
+/// The lines of what was compared with the truth.
+fn lines(mean: &FrameResult) -> String {
     let kinds = [
         ("surface", mean.surface.as_ref()),
         ("carried", mean.carried.as_ref()),
         ("linear", Some(&mean.linear)),
+        ("natural", mean.natural.as_ref()),
     ];
-    for (name, compared) in kinds {
-        let Some(compared) = compared else { continue };
-        line(name, &compared.metrics);
-        line(&format!("{name}, aligned"), &compared.aligned);
-    }
-    line("floor", &mean.floor);
+    let both = |(name, compared): (&str, Option<&Compared>)| {
+        let compared = compared?;
+        let aligned = line(&format!("{name}, aligned"), &compared.aligned);
+        Some(line(name, &compared.metrics) + &aligned)
+    };
+    kinds.into_iter().filter_map(both).collect::<String>() + &line("floor", &mean.floor)
+}
+
+const LEGEND: &str = "CD x10^3 is the squared Chamfer distance of the paper; CD and HD are not squared; aligned: at the \
+                      best times";
+
+/// The means, one line per thing measured.
+fn table(evaluation: &Evaluation, [from, to]: [usize; 2]) -> String {
+    let mut table = format!(
+        "mean over {} frames between {from} and {to}; lengths in normalised units\n",
+        evaluation.frames.len(),
+    );
+    table += &header();
+    table += &lines(&evaluation.mean);
     for (end, result) in ["source", "target"].into_iter().zip(&evaluation.ends) {
         if let Some(surface) = &result.surface {
-            line(&format!("surface, {end}"), &surface.metrics);
+            table += &line(&format!("surface, {end}"), &surface.metrics);
         }
     }
     // The source's vertices start where they are.
     if let Some(carried) = evaluation.ends.last().and_then(|end| end.carried.as_ref()) {
-        line("carried to target", &carried.metrics);
+        table += &line("carried to target", &carried.metrics);
     }
-    table.push_str(
-        "CD x10^3 is the squared Chamfer distance of the paper; CD and HD are not squared; aligned: at the \
-         best times; source, target: the ends that the run was trained on\n",
+    table + LEGEND + "; source, target: the ends that the run was trained on\n"
+}
+
+/// The means over all frames between key frames, then those of each interval, then the drift.
+fn table_of_keys(evaluation: &KeysEvaluation) -> String {
+    let keys = &evaluation.keys;
+    let segments = || evaluation.segments.iter();
+    let count: usize = segments().map(|segment| segment.frames.len()).sum();
+    let mut table = format!(
+        "mean over {count} frames between the key frames {keys:?}; lengths in normalised units\n"
     );
-    table
+    table += &header();
+    table += &lines(&evaluation.mean);
+    for (segment, two) in segments().zip(keys.windows(2)) {
+        let kinds = [
+            ("surface", segment.mean.surface.as_ref()),
+            ("carried", segment.mean.carried.as_ref()),
+        ];
+        for (name, compared) in kinds {
+            if let Some(compared) = compared {
+                let name = format!("{name} {}-{}", two[0], two[1]);
+                table += &line(&name, &compared.metrics);
+            }
+        }
+    }
+    if let Some(drift) = &evaluation.drift {
+        // Writing to a string does not fail.
+        let _ = writeln!(
+            table,
+            "drift of vertices carried from the first key frame: {:.5} in the mean, {:.5} at the last one, {:.5} there and back",
+            drift.mean, drift.last, drift.there_and_back
+        );
+    }
+    table + LEGEND + "; natural: cubic splines through all true vertices of the key frames\n"
 }

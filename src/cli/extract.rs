@@ -1,9 +1,9 @@
 //! `isomorph extract`: surfaces of a trained run at any times and resolution.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use isomorph::{ExtractOptions, OutputFormat, Precision, SurfaceFormat, Trained};
+use isomorph::{Ease, ExtractOptions, OutputFormat, Precision, SurfaceFormat, Trained};
 
 use super::times::times_of;
 use super::{BackendArgs, Failure, ProgressArgs, Result, print, stop_on_interrupt};
@@ -31,6 +31,24 @@ pub(super) struct ExtractArgs {
         conflicts_with = "frames"
     )]
     times: Vec<String>,
+
+    /// Instead of --frames: surfaces for each second of the animation
+    #[arg(long, value_name = "F", conflicts_with_all = ["frames", "times"], value_parser = clap::value_parser!(u32).range(1..=1000))]
+    fps: Option<u32>,
+
+    /// How long the animation is [default: 2 seconds, or a second from each of more shapes to the next]
+    #[arg(long, value_name = "S", conflicts_with = "times")]
+    seconds: Option<f64>,
+
+    /// How the animation runs through the motion: linear, smooth (from rest to rest), or a file of moments and the
+    /// time of the motion at each, two numbers on each line
+    #[arg(
+        long,
+        value_name = "EASE",
+        default_value = "linear",
+        conflicts_with = "times"
+    )]
+    ease: String,
 
     /// Grid cells along the longest side of the box, 8 to 2048 [default: result.resolution]
     #[arg(long, value_name = "R", value_parser = clap::value_parser!(u32).range(8..=2048))]
@@ -115,12 +133,54 @@ fn output_format(format: Format, compact: bool) -> Result<OutputFormat> {
     })
 }
 
+/// The most seconds of an animation, and the most surfaces of one.
+const MOST_SECONDS: f64 = 86_400.0;
+const MOST_FRAMES: f64 = 10_000.0;
+
+/// The times of the surfaces, and when each is shown.
+fn moments(args: &ExtractArgs, trained: &Trained) -> Result<(Vec<f64>, Option<Vec<f64>>)> {
+    let is_plain = args.fps.is_none() && args.seconds.is_none() && args.ease == "linear";
+    if is_plain || !args.times.is_empty() {
+        let times = times_of(trained, &args.times, args.frames as usize)?;
+        return Ok((times, None));
+    }
+    let intervals = trained.key_times().len() - 1;
+    let seconds = args.seconds.unwrap_or((intervals as f64).max(2.0));
+    if !(seconds > 0.0 && seconds <= MOST_SECONDS) {
+        return Err(Failure::Usage(format!(
+            "--seconds {seconds}: must be above 0 and at most {MOST_SECONDS}"
+        )));
+    }
+    let count = match args.fps {
+        None => args.frames as usize,
+        Some(fps) => {
+            let count = (seconds * f64::from(fps)).round() + 1.0;
+            if count > MOST_FRAMES {
+                return Err(Failure::Usage(format!(
+                    "--fps {fps}: {count} surfaces in {seconds} seconds; at most {MOST_FRAMES}"
+                )));
+            }
+            count as usize
+        }
+    };
+    let ease = match args.ease.as_str() {
+        "linear" => Ease::Linear,
+        "smooth" => Ease::Smooth,
+        file => Ease::read(Path::new(file))?,
+    };
+    let last = count.max(2) - 1;
+    let shown = (0..count).map(|k| seconds * k as f64 / last as f64);
+    Ok((ease.times(count, trained.span()), Some(shown.collect())))
+}
+
 pub(super) fn run(args: ExtractArgs) -> Result {
     let format = output_format(args.format, args.compact)?;
     let trained = Trained::open(&args.run, args.place.backend()?)?;
     let defaults = ExtractOptions::of(trained.recipe());
+    let (times, seconds) = moments(&args, &trained)?;
     let options = ExtractOptions {
-        times: times_of(&trained, &args.times, args.frames as usize)?,
+        times,
+        seconds,
         resolution: args
             .resolution
             .map_or(defaults.resolution, |cells| cells as usize),

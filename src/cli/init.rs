@@ -1,4 +1,4 @@
-//! `isomorph init`: a recipe for two shapes, with every key explained.
+//! `isomorph init`: a recipe for two shapes or more, with every key explained.
 
 use std::path::PathBuf;
 
@@ -9,7 +9,7 @@ use isomorph::{Recipe, Shape};
 
 use super::{Failure, Result, print};
 
-/// Print a commented recipe for two shapes
+/// Print a commented recipe for two shapes, or for three and more key frames
 ///
 /// The shapes and the pairs are read, so that what is wrong with a file is reported at once. The ten keys that people change stand
 /// first. The other keys of the chosen method follow. Save the recipe as a file and train with
@@ -19,17 +19,19 @@ pub(super) struct InitArgs {
     /// Shape at time 0, a mesh or point cloud: PLY, OBJ, STL, OFF, glTF, NPY or text
     source: PathBuf,
 
-    /// Shape at time 1
-    target: PathBuf,
+    /// Shape at time 1; and further shapes, at the times 2, 3 and so on, which the recipe can change
+    #[arg(required = true)]
+    target: Vec<PathBuf>,
 
     /// Corresponding vertices: a file with source_index,target_index on each line, same-vertices, match
     /// (found before training), or none
     #[arg(long, value_name = "FILE", default_value = "none")]
     correspondences: String,
 
-    /// Values of all other keys: instant, quick, default, quality or paper
-    #[arg(long, default_value = "default")]
-    preset: String,
+    /// Values of all other keys: instant, quick, default, quality or paper [default: default; instant for three shapes
+    /// and more, which networks do not take]
+    #[arg(long)]
+    preset: Option<String>,
 
     /// Print the keys of all methods, each with the methods in which it acts
     #[arg(long)]
@@ -37,30 +39,40 @@ pub(super) struct InitArgs {
 }
 
 pub(super) fn run(args: InitArgs) -> Result {
-    let (source, target) = (Shape::read(&args.source)?, Shape::read(&args.target)?);
-    let preset = Preset::from_word(&args.preset).ok_or_else(|| {
+    let files: Vec<PathBuf> = [args.source].into_iter().chain(args.target).collect();
+    let shapes: Vec<Shape> = files
+        .iter()
+        .map(Shape::read)
+        .collect::<isomorph::Result<_>>()?;
+    let is_pair = files.len() == 2;
+    let usual = if is_pair { "default" } else { "instant" };
+    let word = args.preset.as_deref().unwrap_or(usual);
+    let preset = Preset::from_word(word).ok_or_else(|| {
         let allowed = Preset::WORDS.join(", ");
-        Failure::Usage(format!(
-            "--preset {}: must be one of {allowed}",
-            args.preset
-        ))
+        Failure::Usage(format!("--preset {word}: must be one of {allowed}"))
     })?;
+    if !is_pair && preset != Preset::Instant {
+        let count = files.len();
+        return Err(Failure::Usage(format!(
+            "--preset {word}: its networks take two shapes, not {count}; give --preset instant"
+        )));
+    }
     let correspondences = match args.correspondences.as_str() {
         "none" => Correspondences::None,
         "same-vertices" => Correspondences::SameVertices,
         "match" => Correspondences::Match,
         file => {
             let file = PathBuf::from(file);
-            known_pairs(&file, &source, &target)?;
+            let [source, target] = &shapes[..] else {
+                let text = "takes two shapes; give each key frame a file of its own in the recipe";
+                return Err(Failure::Usage(format!(
+                    "--correspondences {file:?}: {text}"
+                )));
+            };
+            known_pairs(&file, source, target)?;
             Correspondences::File(file)
         }
     };
-    let text = Recipe::commented(
-        &args.source,
-        &args.target,
-        &correspondences,
-        preset,
-        args.all,
-    );
+    let text = Recipe::commented(&files, &correspondences, preset, args.all);
     print(&text.map_err(isomorph::Error::from)?)
 }

@@ -1,4 +1,4 @@
-//! `isomorph morph`: two files to an animation, without a recipe.
+//! `isomorph morph`: two files or more to an animation, without a recipe.
 
 use std::path::{Path, PathBuf};
 
@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use super::new_run::NewRunArgs;
 use super::{Failure, ProgressArgs, Result, print};
 
-/// Turn one shape into another: an animation and a page to look at, from two files
+/// Turn one shape into another, or through several: an animation and a page to look at, from the files alone
 ///
 /// No recipe is needed. Pairs of points are found, or taken from vertices of equal number where both files have
 /// the same faces. What is assumed is printed first, and what speaks against the result last. The folder
@@ -23,7 +23,19 @@ pub(super) struct MorphArgs {
     /// Shape at time 1
     target: PathBuf,
 
-    /// Folder of the result [default: runs/SOURCE-TARGET]
+    /// Further shapes, at the times 2, 3 and so on: the motion is smooth through all of them
+    more: Vec<PathBuf>,
+
+    /// Times of the shapes instead of 0, 1, 2: in any unit, ascending, such as 0,10,18
+    #[arg(
+        long,
+        value_name = "A,B,C",
+        value_delimiter = ',',
+        allow_hyphen_values = true
+    )]
+    times: Option<Vec<f64>>,
+
+    /// Folder of the result [default: runs/FIRST-LAST]
     #[arg(long, short, value_name = "DIR")]
     output: Option<PathBuf>,
 
@@ -36,7 +48,7 @@ pub(super) struct MorphArgs {
     #[arg(long)]
     preset: Option<String>,
 
-    /// Number of times in the animation, evenly from 0 to 1
+    /// Number of times in the animation, evenly from the first shape to the last
     #[arg(long, value_name = "N", default_value_t = 13, value_parser = clap::value_parser!(u32).range(2..=1000))]
     frames: u32,
 
@@ -45,8 +57,13 @@ pub(super) struct MorphArgs {
 }
 
 pub(super) fn run(args: MorphArgs) -> Result {
+    let files: Vec<PathBuf> = [args.source, args.target]
+        .into_iter()
+        .chain(args.more)
+        .collect();
+    let last = &files[files.len() - 1];
     let folder = args.output.clone();
-    let folder = folder.unwrap_or_else(|| default_folder(&args.source, &args.target));
+    let folder = folder.unwrap_or_else(|| default_folder(&files[0], last));
     if !args.new.force && is_run(&folder) {
         let folder = folder.display();
         return Err(Failure::Usage(format!(
@@ -58,9 +75,10 @@ pub(super) fn run(args: MorphArgs) -> Result {
             pairs: args.pairs.clone(),
             preset: preset.to_owned(),
             frames: args.frames as usize,
+            times: args.times.clone(),
             changes: args.new.set.overrides.clone(),
         };
-        plan_morph(&args.source, &args.target, &options)
+        plan_morph(&files, &options)
     };
     let plan = plan_with(args.preset.as_deref().unwrap_or("instant"))?;
     let progress = args.new.progress;
@@ -82,7 +100,9 @@ pub(super) fn run(args: MorphArgs) -> Result {
         |event| watch.observe(event),
     );
     let page = match first {
-        Err(Failure::Library(error)) if args.preset.is_none() && error.calls_for_networks() => {
+        Err(Failure::Library(error))
+            if args.preset.is_none() && files.len() == 2 && error.calls_for_networks() =>
+        {
             let finding = format!("the preset instant failed ({error})");
             let note = Doubt {
                 finding,

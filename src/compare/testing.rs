@@ -103,6 +103,7 @@ fn result(share: f64, surface: Option<f64>, carried: Option<f64>) -> FrameResult
             compared
         }),
         linear: compared(share * 0.001),
+        natural: None,
         floor: Metrics {
             chamfer_squared: 0.000_01,
             normal_consistency: 0.99,

@@ -68,6 +68,9 @@ pub struct FrameResult {
     pub carried: Option<Compared>,
     /// Straight lines between all true corresponding vertices of the two ends.
     pub linear: Compared,
+    /// The natural cubic spline through all true vertices of the key frames, where a run has more than two.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub natural: Option<Compared>,
     /// Two independent samplings of the true surface: no method can be below it.
     pub floor: Metrics,
 }
@@ -84,4 +87,30 @@ pub struct Evaluation {
     /// wrote.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub ends: Vec<FrameResult>,
+}
+
+/// Everything that `evaluate --keys` measures of a run through many key frames.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct KeysEvaluation {
+    /// The frames that are the key frames.
+    pub keys: Vec<usize>,
+    /// From each key frame to the next: the frames between, carried vertices starting at the earlier key frame.
+    pub segments: Vec<Evaluation>,
+    /// The mean over all frames between, entry by entry.
+    pub mean: FrameResult,
+    /// Vertices carried from the first key frame through all of the others; where the method carries any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub drift: Option<Drift>,
+}
+
+/// How far vertices are from the true ones that are carried from the first key frame: root mean squares over
+/// vertices.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Drift {
+    /// The mean over all frames between key frames.
+    pub mean: f64,
+    /// At the last key frame.
+    pub last: f64,
+    /// Where they started, once they are carried back from there.
+    pub there_and_back: f64,
 }

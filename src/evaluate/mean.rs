@@ -30,6 +30,7 @@ fn mean_frame(frames: &[FrameResult]) -> FrameResult {
         surface: optional(|frame| frame.surface.as_ref()),
         carried: optional(|frame| frame.carried.as_ref()),
         linear: mean_compared(&linear),
+        natural: optional(|frame| frame.natural.as_ref()),
         floor: mean_metrics(&floor),
     }
 }

@@ -65,6 +65,7 @@ impl Reference {
                 surface,
                 carried,
                 linear: frame.linear.clone(),
+                natural: frame.natural.clone(),
                 floor: frame.floor.clone(),
             })
         };

@@ -8,6 +8,7 @@
 //! | `measure.rs` | one method against the reference, frame by frame |
 //! | `align.rs` | the best times of a method, in the order of the frames |
 //! | `vertex_path.rs` | vertices over time: what is carried, and straight lines |
+//! | `natural.rs` | the natural cubic spline through the true vertices of key frames |
 //! | `sampled.rs` | a surface ready to be compared: samples, search, measures of its mesh |
 //! | `metrics.rs` | two such surfaces compared |
 //! | `pieces.rs` | connected pieces of a mesh |
@@ -28,6 +29,7 @@ mod evaluation;
 mod mean;
 mod measure;
 mod metrics;
+mod natural;
 mod pieces;
 mod reference;
 mod sampled;
@@ -40,7 +42,7 @@ mod vertex_path;
 
 pub(crate) use candidate::{Candidate, Carried, Purpose};
 pub(crate) use error::{EvaluateError, TruthError};
-pub use evaluation::{Compared, Evaluation, FrameResult, Metrics};
+pub use evaluation::{Compared, Drift, Evaluation, FrameResult, KeysEvaluation, Metrics};
 pub(crate) use reference::{Options, Reference};
 pub use truth::GroundTruth;
 pub(crate) use truth::Span;

@@ -3,6 +3,7 @@
 
 use super::align::evenly_spaced;
 use super::metrics::{compare, mean_squared_error};
+use super::natural;
 use super::sampled::{NoArea, SampledSurface, Use, generator};
 use super::vertex_path::VertexPath;
 use super::{Compared, GroundTruth, Metrics, Span, TruthError};
@@ -75,6 +76,8 @@ pub(super) struct TrueFrame {
     /// Normalised.
     pub vertices: Vec<[f32; 3]>,
     pub linear: Compared,
+    /// Where the span is one of many.
+    pub natural: Option<Compared>,
     pub floor: Metrics,
 }
 
@@ -119,6 +122,7 @@ impl Reference {
             time: span.time(frame),
             vertices: vertices(frame),
             linear: Compared::default(),
+            natural: None,
             floor: Metrics::default(),
         };
         let mut reference = Self {
@@ -143,6 +147,42 @@ impl Reference {
                 path: truth.path().to_owned(),
                 frame,
             })?;
+        Ok(reference)
+    }
+
+    /// [`Self::new`] of a span between two of many key frames, with the natural cubic spline through all of them.
+    ///
+    /// # Errors
+    /// Those of [`Self::new`].
+    pub(crate) fn between_keys(
+        truth: &GroundTruth,
+        span: Span,
+        keys: &[usize],
+        normalisation: &Normalisation,
+        options: Options,
+    ) -> Result<Self, TruthError> {
+        let mut reference = Self::new(truth, span, normalisation, options)?;
+        let vertices: Vec<_> = keys
+            .iter()
+            .map(|key| truth.normalised(*key, normalisation))
+            .collect();
+        let keys: Vec<f64> = keys.iter().map(|key| *key as f64).collect();
+        let [from, to] = [span.from(), span.to()].map(|frame| frame as f64);
+        let times = reference.all_times();
+        let path = natural::through(&keys, &vertices, &times, |t| from + t * (to - from));
+        let aligned = path.align(&reference.true_vertices(), &reference.grid);
+        for (place, aligned) in aligned.into_iter().enumerate() {
+            let frame = &reference.frames[place];
+            let measure = || -> Result<Compared, NoArea> {
+                let truth = reference.true_surface(frame, Use::Truth)?;
+                reference.compare_vertices(frame, &truth, &path, aligned)
+            };
+            let found = measure().map_err(|_no_area| TruthError::Collapsed {
+                path: truth.path().to_owned(),
+                frame: frame.frame,
+            })?;
+            reference.frames[place].natural = Some(found);
+        }
         Ok(reference)
     }
 

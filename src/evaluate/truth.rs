@@ -1,9 +1,9 @@
 //! The true frames: a sequence of one mesh, vertex by vertex, and the two frames that a run is
 //! given.
 
-use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
 
+use isomorph_training::recipe::natural_order;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -262,36 +262,6 @@ fn meshes_in(folder: &Path) -> Result<Vec<PathBuf>, TruthError> {
     }
     named.sort_by(|(a, _), (b, _)| natural_order(a, b));
     Ok(named.into_iter().map(|(_, path)| path).collect())
-}
-
-/// Names in the order in which people count: runs of digits compare as numbers.
-fn natural_order(a: &str, b: &str) -> Ordering {
-    let (mut left, mut right) = (a, b);
-    while let (Some(x), Some(y)) = (left.chars().next(), right.chars().next()) {
-        let order = if x.is_ascii_digit() && y.is_ascii_digit() {
-            let (one, other) = (take_digits(&mut left), take_digits(&mut right));
-            // Without leading zeros the longer number is the greater, whatever its size.
-            one.len().cmp(&other.len()).then(one.cmp(other))
-        } else {
-            (left, right) = (&left[x.len_utf8()..], &right[y.len_utf8()..]);
-            x.cmp(&y)
-        };
-        if order != Ordering::Equal {
-            return order;
-        }
-    }
-    // One is the beginning of the other, or they differ in leading zeros only.
-    left.len().cmp(&right.len()).then(a.cmp(b))
-}
-
-/// Takes the digits that the text begins with, and gives them without leading zeros.
-fn take_digits<'a>(text: &mut &'a str) -> &'a str {
-    let end = text
-        .find(|c: char| !c.is_ascii_digit())
-        .unwrap_or(text.len());
-    let (digits, rest) = text.split_at(end);
-    *text = rest;
-    digits.trim_start_matches('0')
 }
 
 /// Whether a shape is the first one with its vertices moved.

@@ -24,6 +24,3 @@ pub(crate) use builder::GltfError;
 pub use builder::Precision;
 pub(crate) use morph::{Material, Morphing, Part, Texture, morphing, shown_colour};
 pub(crate) use sequence::{Still, in_turn};
-
-/// How long an animation runs from time 0 to time 1.
-pub(crate) const SECONDS: f64 = 2.0;

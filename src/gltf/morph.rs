@@ -5,7 +5,6 @@
 
 use serde_json::{Value, json};
 
-use super::SECONDS;
 use super::builder::{Builder, GltfError, Precision, QUANTISED};
 use super::frame::Frame;
 use crate::geometry::vertex_normals;
@@ -45,8 +44,10 @@ pub(crate) struct Texture {
 pub(crate) struct Morphing<'a> {
     /// Its name.
     pub name: &'a str,
-    /// Ascending times, 0 to 1.
+    /// The times, as the shape keys are named.
     pub times: &'a [f64],
+    /// When in the animation each is shown, in ascending seconds.
+    pub seconds: &'a [f64],
     /// The positions at each of the times, `[times, vertices]`.
     pub positions: &'a [Vec<[f64; 3]>],
     /// For each vertex of the file that is written the vertex that it moves with: those along a seam of a
@@ -94,7 +95,7 @@ pub(crate) fn morphing(scene: &Morphing) -> Result<Vec<u8>, GltfError> {
         mesh["weights"] = json!(vec![0.0; targets.len()]);
         let named = scene.times[1..].iter().map(|time| format!("t={time:.3}"));
         mesh["extras"] = json!({"targetNames": named.collect::<Vec<_>>()});
-        root["animations"] = json!([animation(scene.times, &mut builder)]);
+        root["animations"] = json!([animation(scene.seconds, &mut builder)]);
     }
     root["nodes"] = json!([node]);
     root["meshes"] = json!([mesh]);
@@ -239,7 +240,7 @@ fn primitives(
 
 /// The weights of all targets over time.
 fn animation(times: &[f64], builder: &mut Builder) -> Value {
-    let seconds: Vec<f32> = times.iter().map(|time| (SECONDS * time) as f32).collect();
+    let seconds: Vec<f32> = times.iter().map(|second| *second as f32).collect();
     let targets = times.len() - 1;
     let mut weights = vec![0.0; times.len() * targets];
     for k in 1..times.len() {

@@ -4,15 +4,16 @@
 
 use serde_json::{Value, json};
 
-use super::SECONDS;
 use super::builder::{Builder, GltfError, Precision};
 use super::frame::Frame;
 use super::morph::{directed, require_quantised, surface};
 
 /// A mesh at one time.
 pub(crate) struct Still {
-    /// Its time, 0 to 1.
+    /// Its time, as it is noted.
     pub time: f64,
+    /// When in the animation it is shown, in seconds.
+    pub second: f64,
     /// Positions.
     pub vertices: Vec<[f64; 3]>,
     /// Unit normals, one for each vertex.
@@ -98,11 +99,11 @@ fn mesh(
 
 /// Shows each mesh from half-way to the one before until half-way to the one after.
 fn animation(stills: &[Still], nodes: &[usize], builder: &mut Builder) -> Value {
-    let times: Vec<f64> = stills.iter().map(|still| still.time).collect();
+    let times: Vec<f64> = stills.iter().map(|still| still.second).collect();
     let half_way = times.windows(2).map(|pair| (pair[0] + pair[1]) / 2.0);
     let ends = [times[0], times[times.len() - 1]];
     let seconds: Vec<f32> = ([ends[0]].into_iter().chain(half_way).chain([ends[1]]))
-        .map(|time| (SECONDS * time) as f32)
+        .map(|second| second as f32)
         .collect();
     let input = builder.times(&seconds);
     let (mut samplers, mut channels) = (Vec::new(), Vec::new());
@@ -131,6 +132,7 @@ mod tests {
         let corner = |k: usize| [k as f64, (k * k) as f64, time];
         Still {
             time,
+            second: 2.0 * time,
             vertices: (0..vertices).map(corner).collect(),
             normals: vec![[0.0, 0.0, 1.0]; vertices],
             triangles: (2..vertices as u32).map(|k| [0, k - 1, k]).collect(),

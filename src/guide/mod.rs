@@ -4,6 +4,7 @@
 //! |---|---|
 //! | [`first_steps`] | from nothing to a first result, and what to look at |
 //! | [`worked_jobs`] | three jobs from files to an animation, with commands, pictures and times |
+//! | [`sequences`] | one motion through three shapes and more |
 //! | [`shapes`] | files, normals, correspondences, coordinates |
 //! | [`recipes`] | the settings of a run: presets, sections, the ten keys that people change |
 //! | [`results`] | what a run leaves, how to measure it, and how good the method is |
@@ -28,6 +29,11 @@ pub mod first_steps {
 pub mod worked_jobs {
     #![doc = include_str!("links.txt")]
     #![doc = include_str!("worked_jobs.md")]
+}
+
+pub mod sequences {
+    #![doc = include_str!("links.txt")]
+    #![doc = include_str!("sequences.md")]
 }
 
 pub mod shapes {

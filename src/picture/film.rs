@@ -12,9 +12,6 @@ use super::canvas::Canvas;
 use super::{Frame, LABEL, LETTERS, PictureError, View, WHITE, check, draw, place, text_width};
 use crate::atomic::write_atomically;
 
-/// Milliseconds from time 0 to time 1.
-const DURATION: f32 = 2000.0;
-
 /// Milliseconds for which the first and the last surface stand still.
 const HELD: u16 = 600;
 
@@ -35,21 +32,21 @@ pub(crate) fn film(frames: &[Frame<'_>], view: &View, path: &Path) -> Result<(),
             picture
         })
         .collect();
-    let times: Vec<f32> = frames.iter().map(|frame| frame.time).collect();
+    let times: Vec<f32> = frames.iter().map(|frame| frame.second).collect();
     let bytes = animated(&pictures, &order(&times)).map_err(io::Error::other)?;
     Ok(write_atomically(path, |out| out.write_all(&bytes))?)
 }
 
 /// The frames there and back, each with the milliseconds for which it is shown.
-fn order(times: &[f32]) -> Vec<(usize, u16)> {
-    let last = times.len() - 1;
+fn order(seconds: &[f32]) -> Vec<(usize, u16)> {
+    let last = seconds.len() - 1;
     let back = (1..last).rev();
     let shown = (0..=last).chain(back).map(|k| {
         if k == 0 || k == last {
             return (k, HELD);
         }
-        let until = (times[k + 1] - times[k - 1]) / 2.0;
-        (k, (DURATION * until).round().max(1.0) as u16)
+        let until = (seconds[k + 1] - seconds[k - 1]) / 2.0;
+        (k, (1000.0 * until).round().max(1.0) as u16)
     });
     shown.collect()
 }
@@ -83,10 +80,10 @@ mod tests {
     #[test]
     fn the_frames_go_there_and_back_and_stand_at_the_ends() {
         assert_eq!(
-            order(&[0.0, 0.25, 1.0]),
+            order(&[0.0, 0.5, 2.0]),
             [(0, HELD), (1, 1000), (2, HELD), (1, 1000)]
         );
-        assert_eq!(order(&[0.0, 1.0]), [(0, HELD), (1, HELD)]);
+        assert_eq!(order(&[0.0, 2.0]), [(0, HELD), (1, HELD)]);
         assert_eq!(order(&[0.5]), [(0, HELD)]);
     }
 
@@ -98,6 +95,7 @@ mod tests {
                 vertices,
                 triangles: &[[0, 1, 2]],
                 time,
+                second: 2.0 * time,
                 named: f64::from(time),
             })
             .collect();

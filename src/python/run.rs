@@ -37,6 +37,11 @@ impl Run {
         self.0.path()
     }
 
+    /// The times of the key frames.
+    fn key_times(&self) -> Vec<f64> {
+        self.0.key_times()
+    }
+
     /// The recipe as TOML.
     fn recipe(&self) -> String {
         self.0.recipe().to_toml()

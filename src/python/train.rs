@@ -20,12 +20,12 @@ pub(crate) fn recipe(text: &str, origin: PathBuf, changes: Vec<String>) -> PyRes
 /// A recipe, what it takes for granted, and what may be wrong with it: a finding and a cure each.
 type Plan = (String, Vec<String>, Vec<(String, String)>);
 
-/// A recipe for two files as TOML, what it takes for granted, and what may be wrong with it.
+/// A recipe for files as TOML, what it takes for granted, and what may be wrong with it.
 #[pyfunction]
 pub(crate) fn plan(
     py: Python<'_>,
-    source: PathBuf,
-    target: PathBuf,
+    files: Vec<PathBuf>,
+    times: Option<Vec<f64>>,
     preset: String,
     pairs: Option<String>,
     frames: usize,
@@ -34,10 +34,11 @@ pub(crate) fn plan(
     let options = MorphOptions {
         pairs,
         preset,
+        times,
         frames,
         changes,
     };
-    let plan = py.detach(|| plan_morph(&source, &target, &options));
+    let plan = py.detach(|| plan_morph(&files, &options));
     let plan = plan.map_err(raised)?;
     let doubts = plan
         .doubts

@@ -265,6 +265,7 @@ impl Bench<'_> {
             normalisation: truth.normalisation,
             resolution: self.resolution(recipe),
             smallest_component: recipe.result.smallest_component,
+            within: [0.0, 1.0],
             stop: self.stop,
         };
         make(&run, recipe, &prepared, &*self.engine, &ruler, on_event)

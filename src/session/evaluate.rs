@@ -5,8 +5,8 @@ use super::prepare;
 use super::stop::StopFlag;
 use super::trained::Trained;
 use crate::atomic::write_atomically;
-use crate::error::Result;
-use crate::evaluate::{Evaluation, GroundTruth, Options, Reference, Span};
+use crate::error::{Error, Result};
+use crate::evaluate::{Drift, Evaluation, GroundTruth, KeysEvaluation, Options, Reference, Span};
 use crate::event::Event;
 use crate::shape::Normalisation;
 
@@ -62,7 +62,13 @@ impl Trained {
         let recipe = self.recipe();
         // Only the points are looked at: what corresponds to what plays no part.
         let keyframes = prepare::points_only(recipe)?;
-        let [source, target] = [0, 1].map(|k| &keyframes.keys[k].cloud.points);
+        let [source, target] = &keyframes.keys[..] else {
+            let count = keyframes.keys.len();
+            return Err(Error::usage(format!(
+                "the run has {count} key frames: name the frames that they are, with --keys"
+            )));
+        };
+        let [source, target] = [source, target].map(|key| &key.cloud.points[..]);
         truth.check_ends(span, &keyframes.normalisation, source, target)?;
         let normalisation = true_frame(truth, span)?;
         let reference = Reference::new(truth, span, &normalisation, options.of_reference())?;
@@ -71,6 +77,7 @@ impl Trained {
             normalisation,
             resolution: options.resolution.unwrap_or(recipe.result.resolution),
             smallest_component: recipe.result.smallest_component,
+            within: [0.0, 1.0],
             stop,
         };
         let evaluation = measure(self.learned(), &ruler, &mut on_event)?;
@@ -78,6 +85,121 @@ impl Trained {
         let file = self.path().join("evaluation.json");
         write_atomically(&file, |out| out.write_all(text.as_bytes()))?;
         Ok(evaluation)
+    }
+}
+
+impl Trained {
+    /// Measures a run through many key frames, which are the frames `keys` of the truth, against all frames between
+    /// them, and leaves the numbers in its folder, in `evaluation.json`. Two key frames are many enough.
+    ///
+    /// # Errors
+    /// Of kind [`Interruption`](crate::ErrorKind::Interruption) if the stop flag was set; other frames than those of
+    /// the run; an option out of range.
+    pub fn evaluate_keys(
+        &self,
+        truth: &GroundTruth,
+        keys: &[usize],
+        options: &EvaluateOptions,
+        stop: &StopFlag,
+        mut on_event: impl FnMut(&Event),
+    ) -> Result<KeysEvaluation> {
+        let recipe = self.recipe();
+        let keyframes = prepare::points_only(recipe)?;
+        if keys.len() != keyframes.keys.len() {
+            return Err(Error::usage(format!(
+                "{} frames for the {} key frames of the run: give one for each",
+                keys.len(),
+                keyframes.keys.len()
+            )));
+        }
+        let spans: Vec<Span> = keys
+            .windows(2)
+            .map(|two| truth.span(two[0], two[1]))
+            .collect::<std::result::Result<_, _>>()?;
+        for (span, two) in spans.iter().zip(keyframes.keys.windows(2)) {
+            let [source, target] = [&two[0], &two[1]].map(|key| &key.cloud.points[..]);
+            truth.check_ends(*span, &keyframes.normalisation, source, target)?;
+        }
+        let shapes: Vec<_> = keys.iter().map(|key| truth.shape(*key)).collect();
+        let shapes: Vec<&_> = shapes.iter().collect();
+        let normalisation = Normalisation::joint(&shapes)?;
+        let times: Vec<f64> = keyframes.keys.iter().map(|key| key.time).collect();
+        let mut segments = Vec::with_capacity(spans.len());
+        for (span, two) in spans.iter().zip(times.windows(2)) {
+            let options_here = options.of_reference();
+            let reference =
+                Reference::between_keys(truth, *span, keys, &normalisation, options_here)?;
+            let ruler = Ruler {
+                reference: &reference,
+                normalisation,
+                resolution: options.resolution.unwrap_or(recipe.result.resolution),
+                smallest_component: recipe.result.smallest_component,
+                within: [two[0], two[1]],
+                stop,
+            };
+            segments.push(measure(self.learned(), &ruler, &mut on_event)?);
+        }
+        let all = segments.iter().flat_map(|segment| segment.frames.clone());
+        let evaluation = KeysEvaluation {
+            keys: keys.to_vec(),
+            mean: Evaluation::of(all.collect()).mean,
+            drift: self.drift(truth, keys, &normalisation)?,
+            segments,
+        };
+        let text = serde_json::to_string(&evaluation)? + "\n";
+        let file = self.path().join("evaluation.json");
+        write_atomically(&file, |out| out.write_all(text.as_bytes()))?;
+        Ok(evaluation)
+    }
+
+    /// How far vertices that are carried from the first key frame are from the true ones.
+    fn drift(
+        &self,
+        truth: &GroundTruth,
+        keys: &[usize],
+        normalisation: &Normalisation,
+    ) -> Result<Option<Drift>> {
+        let learned = self.learned();
+        if learned.motion().is_err() {
+            return Ok(None);
+        }
+        let (first, last) = (keys[0], keys[keys.len() - 1]);
+        let times = self.key_times();
+        let clock = self.clock();
+        // Each frame's time in the run: frames are even between two key frames.
+        let mut frames = Vec::new();
+        for (two, key_times) in keys.windows(2).zip(times.windows(2)) {
+            for frame in two[0] + 1..=two[1] {
+                let share = (frame - two[0]) as f64 / (two[1] - two[0]) as f64;
+                let own = key_times[0] + share * (key_times[1] - key_times[0]);
+                frames.push((frame, clock.unit(own)?));
+            }
+        }
+        let apply = |frame: usize| -> Vec<[f32; 3]> {
+            let vertices = truth.vertices(frame).iter();
+            vertices.map(|x| learned.normalisation.apply(*x)).collect()
+        };
+        let start = apply(first);
+        let units: Vec<f64> = frames.iter().map(|(_, unit)| *unit).collect();
+        let path = learned.path(&start, &units)?;
+        // From the units of the run to those in which everything else is measured.
+        let scale = normalisation.scale / learned.normalisation.scale;
+        let off = |a: &[[f32; 3]], b: &[[f32; 3]]| {
+            let squares = a.as_flattened().iter().zip(b.as_flattened());
+            let sum: f64 = squares.map(|(a, b)| f64::from(a - b).powi(2)).sum();
+            scale * (sum / a.len() as f64).sqrt()
+        };
+        let between: Vec<f64> = (frames.iter().zip(&path))
+            .filter(|((frame, _), _)| !keys.contains(frame))
+            .map(|((frame, _), carried)| off(carried, &apply(*frame)))
+            .collect();
+        let arrived = &path[path.len() - 1];
+        let back = learned.carry(arrived, 1.0, 0.0)?;
+        Ok(Some(Drift {
+            mean: between.iter().sum::<f64>() / between.len() as f64,
+            last: off(arrived, &apply(last)),
+            there_and_back: off(&back, &start),
+        }))
     }
 }
 

@@ -15,13 +15,18 @@ use crate::event::Event;
 use crate::formats::SurfaceFormat;
 use crate::picture;
 use crate::recipe::Recipe;
-use crate::surface::frames::{CarriedSource, Frame, FrameOptions, OutputFormat, write_frames};
+use crate::surface::frames::{
+    CarriedSource, Frame, FrameOptions, OutputFormat, SECONDS, write_frames,
+};
 
 /// What to write.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExtractOptions {
     /// The times, from that of the first shape to that of the last ([`Trained::span`]).
     pub times: Vec<f64>,
+    /// When each is shown in an animation, in seconds; without it at an even pace, in 2 seconds for two shapes and a
+    /// second from each of more shapes to the next.
+    pub seconds: Option<Vec<f64>>,
     /// Cells of the grid along the longest side of the box.
     pub resolution: usize,
     /// The kind of the files.
@@ -51,6 +56,7 @@ impl ExtractOptions {
     pub fn of(recipe: &Recipe) -> Self {
         Self {
             times: result_times(recipe),
+            seconds: None,
             resolution: recipe.result.resolution,
             format: OutputFormat::Frames(SurfaceFormat::Ply),
             film: false,
@@ -137,6 +143,24 @@ impl Trained {
         Ok(self.output(options).join("frames.json"))
     }
 
+    /// When each surface is shown in an animation.
+    fn seconds(&self, options: &ExtractOptions) -> Result<Vec<f64>> {
+        let Some(seconds) = &options.seconds else {
+            let intervals = self.recipe().data.keyframes.len() - 1;
+            let all = SECONDS.max(intervals as f64);
+            let units = options.times.iter().map(|time| self.clock().unit(*time));
+            return units.map(|unit| Ok(all * unit?)).collect();
+        };
+        if seconds.len() == options.times.len() {
+            return Ok(seconds.clone());
+        }
+        Err(Error::usage(format!(
+            "{} seconds for {} times: give one for each",
+            seconds.len(),
+            options.times.len()
+        )))
+    }
+
     /// Where the files go.
     fn output(&self, options: &ExtractOptions) -> PathBuf {
         let folder = options.folder.clone();
@@ -182,12 +206,8 @@ impl Trained {
         let frame_options = FrameOptions {
             times: times?,
             names: options.times.clone(),
-            keys: match self.key_times() {
-                keys if keys.len() > 2 => {
-                    keys.iter().map(|t| clock.unit(*t)).collect::<Result<_>>()?
-                }
-                _ => Vec::new(),
-            },
+            seconds: self.seconds(options)?,
+            keys: self.key_units(),
             resolution: options.resolution,
             format: options.format,
             trust: options.trust,
@@ -249,6 +269,7 @@ fn drawn(frame: &Frame) -> picture::Frame<'_> {
         vertices: &frame.mesh.vertices,
         triangles: &frame.mesh.triangles,
         time: frame.time as f32,
+        second: frame.second as f32,
         named: frame.entry.time,
     }
 }
@@ -269,7 +290,7 @@ pub(super) fn show(frames: &[Frame], folder: &Path, film: bool) -> io::Result<()
     }
     let mut all: Vec<_> = frames.iter().filter(filled).map(drawn).collect();
     if film && !all.is_empty() {
-        all.sort_by(|a, b| a.time.total_cmp(&b.time));
+        all.sort_by(|a, b| a.second.total_cmp(&b.second));
         picture::film(&all, &view, &folder.join("animation.png")).map_err(io::Error::other)?;
     }
     Ok(())

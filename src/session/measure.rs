@@ -29,6 +29,8 @@ pub(super) struct Ruler<'a> {
     pub resolution: usize,
     /// Pieces with less than this share of a surface's area are left out.
     pub smallest_component: f64,
+    /// The times of the run between which is measured: 0 and 1, or those of two key frames.
+    pub within: [f64; 2],
     /// Set to stop.
     pub stop: &'a StopFlag,
 }
@@ -37,6 +39,7 @@ pub(super) struct Ruler<'a> {
 struct Measured<'a> {
     learned: &'a Learned,
     smallest: f64,
+    within: [f64; 2],
     truth: Normalisation,
     fine: Grid,
     coarse: Grid,
@@ -51,6 +54,7 @@ impl<'a> Measured<'a> {
         Ok(Self {
             learned,
             smallest: ruler.smallest_component,
+            within: ruler.within,
             truth: ruler.normalisation,
             fine: grid(ruler.resolution)?,
             coarse: grid(ruler.resolution.min(COARSE))?,
@@ -62,7 +66,7 @@ impl<'a> Measured<'a> {
     fn extracted(&self, grid: &Grid, time: f64) -> Result<Option<Mesh<f32>>, FramesError> {
         match self
             .learned
-            .surface_at(grid, time, self.smallest, &mut |_| {})
+            .surface_at(grid, self.of_run(time), self.smallest, &mut |_| {})
         {
             Ok(found) => Ok(Some(found.mesh)),
             // The field has one sign in the whole box: the surface has vanished.
@@ -87,9 +91,20 @@ impl<'a> Measured<'a> {
             return Ok(None);
         };
         if time != near {
+            let [near, time] = [near, time].map(|time| self.of_run(time));
             mesh.vertices = self.learned.carry(&mesh.vertices, near, time)?;
         }
         Ok(Some(mesh))
+    }
+
+    /// A time between the ends, 0 to 1, as the run counts.
+    fn of_run(&self, time: f64) -> f64 {
+        let [from, to] = self.within;
+        if time == 1.0 {
+            to
+        } else {
+            from + time * (to - from)
+        }
     }
 
     /// From the method's coordinates to those of the truth.
@@ -141,12 +156,16 @@ impl Candidate for Measured<'_> {
         if self.learned.deformation.motion().is_none() {
             return Ok(None);
         }
-        let path = self.learned.path(&self.learnt(start), times)?;
+        let times: Vec<f64> = times.iter().map(|time| self.of_run(*time)).collect();
+        let start = self.learnt(start);
+        let path = self.learned.path_from(&start, self.within[0], &times)?;
         Ok(Some(path.into_iter().map(|at| self.measured(at)).collect()))
     }
 
     fn slope_error(&mut self, points: &[[f32; 3]], time: f64) -> Result<Option<f64>, FramesError> {
-        Ok(self.learned.slope_error(&self.learnt(points), time))
+        Ok(self
+            .learned
+            .slope_error(&self.learnt(points), self.of_run(time)))
     }
 }
 
@@ -256,6 +275,7 @@ mod tests {
         let mut measured = Measured {
             learned: &learned,
             smallest: 0.0,
+            within: [0.0, 1.0],
             truth: learned.normalisation,
             fine: grid(64).expect("a good grid"),
             coarse: grid(COARSE).expect("a good grid"),

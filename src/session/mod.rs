@@ -46,6 +46,7 @@ pub(crate) mod metrics;
 pub(crate) mod morph;
 mod morph_size;
 pub(crate) mod normals;
+pub(crate) mod pace;
 pub(crate) mod pairs;
 mod prepare;
 pub(crate) mod report;

@@ -1,30 +1,32 @@
-//! Two files and nothing else: a recipe chosen for them, what it takes for granted, and what speaks against the
+//! Two files or more and nothing else: a recipe chosen for them, what it takes for granted, and what speaks against the
 //! result.
 
-use std::path::Path;
+use std::path::PathBuf;
 
 use super::morph_size::Size;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::event::Event;
 use crate::formats::Shape;
 use crate::geometry::EdgeSharing;
 use crate::recipe::Recipe;
 use crate::shape::CleanOptions;
 
-/// What is asked for beyond the two files.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// What is asked for beyond the files.
+#[derive(Clone, Debug, PartialEq)]
 pub struct MorphOptions {
     /// Pairs of points: a value of `data.correspondences`; chosen by the files without it.
     pub pairs: Option<String>,
     /// The preset.
     pub preset: String,
+    /// The times of the files; 0, 1, 2 and so on without it.
+    pub times: Option<Vec<f64>>,
     /// Surfaces at even times.
     pub frames: usize,
     /// Other keys of the recipe, as in `result.resolution=256`.
     pub changes: Vec<String>,
 }
 
-/// A recipe for two files, and what was assumed for it.
+/// A recipe for files, and what was assumed for it.
 #[derive(Clone, Debug)]
 pub struct MorphPlan {
     /// The recipe.
@@ -53,53 +55,98 @@ impl Doubt {
     }
 }
 
-/// Chooses a recipe for a morph from `source` to `target`.
+/// Chooses a recipe for a morph through `files`, two or more, in the order of their times.
 ///
 /// # Errors
-/// A file that cannot be read, a key that is refused.
-pub fn plan_morph(source: &Path, target: &Path, options: &MorphOptions) -> Result<MorphPlan> {
+/// A file that cannot be read, a key that is refused, fewer than two files, not one time for each.
+pub fn plan_morph(files: &[PathBuf], options: &MorphOptions) -> Result<MorphPlan> {
     // As the recipe reads them, unless it is changed to use all points.
     let read = |path| Ok::<_, crate::Error>(Shape::read(path)?.cleaned(&CleanOptions::default()));
-    let shapes = [read(source)?, read(target)?];
-    let same = same_faces(&shapes);
+    let shapes: Vec<Shape> = files.iter().map(read).collect::<Result<_>>()?;
+    let same = shapes.windows(2).all(|two| same_faces([&two[0], &two[1]]));
     let pairs = options.pairs.as_deref();
     let chosen = pairs.unwrap_or(if same { "same-vertices" } else { "match" });
-    let mut recipe = Recipe::between(source, target)?;
-    recipe.with_all(&[
-        format!("preset={}", options.preset),
-        format!("data.correspondences={chosen}"),
-        format!("result.frames={}", options.frames),
-    ])?;
+    let mut recipe = planned(files, options, chosen)?;
     recipe.with_all(&options.changes)?;
     let mut assumed: Vec<String> = shapes.iter().map(described).collect();
-    let extents = shapes.each_ref().map(Size::of);
+    let extents: Vec<Size> = shapes.iter().map(Size::of).collect();
+    let sizes: Vec<String> = extents.iter().map(Size::to_string).collect();
     assumed.push(format!(
-        "units: those of the files; {} and {} large",
-        extents[0], extents[1]
+        "units: those of the files; {} large",
+        sizes.join(" and ")
     ));
-    assumed.push(format!(
-        "frame: both files are in the same coordinates; their centres are {} apart",
-        extents[0].apart(&extents[1])
-    ));
+    let apart = extents.windows(2).map(|two| two[0].apart(&two[1]));
+    assumed.push(match &apart.collect::<Vec<_>>()[..] {
+        [apart] => format!(
+            "frame: both files are in the same coordinates; their centres are {apart} apart"
+        ),
+        apart => format!(
+            "frame: all files are in the same coordinates; the centres of neighbours are {} apart",
+            apart.join(", ")
+        ),
+    });
     assumed.push(match (chosen, pairs) {
         ("same-vertices", None) => {
-            "pairs: vertices of equal number, since both files have the same faces".to_owned()
+            let all = if files.len() == 2 { "both" } else { "all" };
+            format!("pairs: vertices of equal number, since {all} files have the same faces")
         }
         ("same-vertices", Some(_)) => "pairs: vertices of equal number, as you say".to_owned(),
         ("match", _) => "pairs: found from the shapes alone".to_owned(),
         ("none", _) => "pairs: none; the nearest parts are drawn together".to_owned(),
         (file, _) => format!("pairs: those of {file}"),
     });
+    if files.len() > 2 {
+        let times = recipe.data.keyframes.iter().map(|key| key.time.to_string());
+        let times = times.collect::<Vec<_>>().join(", ");
+        assumed.push(format!(
+            "times: {times}; the motion is smooth through all files"
+        ));
+    }
     assumed.push(format!("preset: {}", options.preset));
+    let doubts = extents.windows(2).flat_map(|two| two[0].doubts(&two[1]));
     Ok(MorphPlan {
         recipe,
         assumed,
-        doubts: extents[0].doubts(&extents[1]),
+        doubts: doubts.collect(),
     })
 }
 
+/// The recipe with these pairs, before it is changed.
+fn planned(files: &[PathBuf], options: &MorphOptions, pairs: &str) -> Result<Recipe> {
+    let set = [
+        format!("preset={}", options.preset),
+        format!("result.frames={}", options.frames),
+    ];
+    let mut recipe = match (files, &options.times) {
+        ([source, target], None) => Recipe::between(source, target)?,
+        (_, times) => {
+            let times = times.clone();
+            let times = times.unwrap_or_else(|| (0..files.len()).map(|k| k as f64).collect());
+            if times.len() != files.len() {
+                return Err(Error::usage(format!(
+                    "{} times for {} files: give one for each",
+                    times.len(),
+                    files.len()
+                )));
+            }
+            let is_word = ["same-vertices", "match", "none"].contains(&pairs);
+            if files.len() > 2 && !is_word {
+                return Err(Error::usage(format!(
+                    "pairs of {pairs}: a file holds those of two shapes; for more, give each key frame a file of its \
+                     own in a recipe (isomorph init)"
+                )));
+            }
+            let shapes: Vec<_> = files.iter().zip(times).collect();
+            Recipe::through(&shapes)?
+        }
+    };
+    recipe.with_all(&set)?;
+    recipe.with(&format!("data.correspondences={pairs}"))?;
+    Ok(recipe)
+}
+
 /// Whether both are meshes of the same triangles: the same mesh in two poses.
-fn same_faces([source, target]: &[Shape; 2]) -> bool {
+fn same_faces([source, target]: [&Shape; 2]) -> bool {
     source.is_mesh()
         && source.mesh.vertices.len() == target.mesh.vertices.len()
         && source.mesh.triangles == target.mesh.triangles
@@ -199,7 +246,11 @@ impl MorphWatch {
 
     /// What speaks against the result; nothing if all looks well.
     pub fn doubts(mut self) -> Vec<Doubt> {
-        let at_ends = |frame: &&Watched| frame.time == 0.0 || frame.time == 1.0;
+        // Those of the first and the last shape, whatever the unit of time.
+        let times = || self.frames.iter().map(|frame| frame.time);
+        let first = times().fold(f64::INFINITY, f64::min);
+        let last = times().fold(f64::NEG_INFINITY, f64::max);
+        let at_ends = |frame: &&Watched| frame.time == first || frame.time == last;
         let ends = self.frames.iter().filter(at_ends);
         let whole = ends.map(|frame| frame.pieces).max();
         let worst = self.frames.iter().max_by_key(|frame| frame.pieces);
@@ -241,8 +292,6 @@ const LONGER: &str = "try --preset default, which takes minutes, or give pairs w
 
 #[cfg(test)]
 mod tests {
-    use std::path::PathBuf;
-
     use super::*;
 
     fn frame(time: f64, components: usize, consistency: f64) -> Event {

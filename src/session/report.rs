@@ -113,6 +113,7 @@ impl Trained {
             let mesh = shape.mesh.moved(|x| self.learned().normalisation.apply(x));
             Some(Frame {
                 time: self.clock().unit(entry.time).ok()?,
+                second: entry.time,
                 entry,
                 components: mesh.components().len(),
                 mesh,

@@ -22,6 +22,10 @@ const VERTICES: usize = 10_000;
 /// Times at which the carried source is shown.
 const TIMES: usize = 25;
 
+/// The same for each interval of many key frames, and at most in all.
+const TIMES_OF_INTERVAL: usize = 6;
+const MOST_TIMES: usize = 73;
+
 /// Bytes of all surfaces over time, before base64.
 const SURFACE_BYTES: usize = 1_800_000;
 
@@ -106,7 +110,9 @@ impl<'a> ReportData<'a> {
                             .apply(self.shapes[0].mesh.vertices[*k as usize])
                     })
                     .collect();
-                let times = even_times(TIMES);
+                let intervals = self.shapes.len() - 1;
+                let times =
+                    even_times((TIMES_OF_INTERVAL * intervals + 1).clamp(TIMES, MOST_TIMES));
                 self.carried = Some(Track {
                     time: 0.0,
                     frames: self.learned().path(&start, &times)?,
@@ -129,7 +135,7 @@ impl<'a> ReportData<'a> {
     fn add_surfaces(&mut self, frames: &[Frame], truth: Option<&TrueShapes>) -> Result<()> {
         for frame in frames {
             self.quality.push(Quality {
-                time: frame.time,
+                time: frame.entry.time,
                 triangles: frame.mesh.triangles.len(),
                 components: Some(frame.components),
                 consistency: frame.entry.consistency,
@@ -271,9 +277,13 @@ impl<'a> ReportData<'a> {
         );
         let [source, target] = self.ends;
         let subtitle = format!(
-            "{} to {}, {}, preset {}, {} steps",
+            "{} to {}{}, {}, preset {}, {} steps",
             source.name,
             target.name,
+            match self.shapes.len() {
+                2 => String::new(),
+                count => format!(" through {count} key frames"),
+            },
             spec_of(recipe).described(),
             recipe.preset,
             recipe.training.steps
@@ -288,6 +298,8 @@ impl<'a> ReportData<'a> {
             subtitle,
             date: date.replace('T', " ").replace('Z', " UTC"),
             unit: 1.0 / trained.learned().normalisation.scale,
+            clock: trained.span(),
+            keys: trained.key_units(),
             bounds: bounds.found(),
             source,
             target,
@@ -328,7 +340,8 @@ fn shown(mesh: &Mesh<f32>) -> Thinned {
 fn times_around(times: &[f64], k: usize, moves: bool) -> Vec<f64> {
     let steps = match times.len() {
         0 | 1 => 0,
-        count if moves => (TIMES / 2) / (count - 1),
+        // One at least, so that no surface jumps.
+        count if moves => ((TIMES / 2) / (count - 1)).max(1),
         _ => 0,
     };
     let towards = |other: f64| {

@@ -150,6 +150,19 @@ impl Trained {
         keys.map(|key| key.time).collect()
     }
 
+    /// The times of the key frames from 0 to 1, where there are more than two.
+    pub(super) fn key_units(&self) -> Vec<f64> {
+        let clock = self.clock();
+        let keys = &self.recipe.data.keyframes;
+        match keys.len() {
+            2 => Vec::new(),
+            _ => keys
+                .iter()
+                .filter_map(|key| clock.unit(key.time).ok())
+                .collect(),
+        }
+    }
+
     pub(super) fn clock(&self) -> Clock {
         Clock::of(&self.recipe)
     }

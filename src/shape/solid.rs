@@ -63,6 +63,16 @@ impl SolidParts {
         }
     }
 
+    /// Whether [`Solid::new`] makes a shape of them.
+    pub(crate) fn is_sound(&self) -> bool {
+        let has_area = || {
+            let mesh = Mesh::new(self.points.clone(), self.triangles.clone());
+            let mut areas = mesh.triangles.iter().map(|t| mesh.triangle_area(*t));
+            areas.any(|area| area > 0.0)
+        };
+        self.is_whole() && has_area()
+    }
+
     /// Whether the numbers fit together: what a damaged file need not.
     fn is_whole(&self) -> bool {
         let count = self.points.len();

@@ -23,7 +23,7 @@ use crate::shape::Solid;
 use crate::surface::learned::some_of;
 
 /// How exactly points are followed, in normalised units: a fifth of a cell at 256 cells to a side.
-const TOLERANCE: f64 = 1e-3;
+pub(super) const TOLERANCE: f64 = 1e-3;
 
 /// The most steps of the integrator over all of time.
 const MOST_STEPS: usize = 32;
@@ -34,34 +34,40 @@ const PROBES: usize = 2000;
 /// Two neighbouring shapes and the field that carries them.
 pub(super) struct CarriedShapes<const H: usize> {
     field: SplineField<f32, H>,
-    shapes: Arc<[Solid]>,
-    /// The first of the two.
-    first: usize,
+    shapes: [Arc<Solid>; 2],
+    /// Whether they are two of many key frames.
+    is_part: bool,
     /// Of the Runge-Kutta integrator over all of time.
     steps: usize,
 }
 
 impl<const H: usize> CarriedShapes<H> {
-    pub(super) fn new(field: SplineField<f32, H>, shapes: Arc<[Solid]>, first: usize) -> Self {
-        let probes = [0, 1].map(|end: usize| some_of(&shapes[first + end].parts().points, PROBES));
+    pub(super) fn new(field: SplineField<f32, H>, shapes: [Arc<Solid>; 2], is_part: bool) -> Self {
+        let probes = shapes
+            .each_ref()
+            .map(|shape| some_of(&shape.parts().points, PROBES));
         let steps = field.steps_within([&probes[0], &probes[1]], TOLERANCE, [2, MOST_STEPS]);
         Self {
             field,
             shapes,
-            first,
+            is_part,
             steps,
         }
     }
 
+    /// The shape at time 0 or at time 1, for others too.
+    pub(super) fn shared(&self, end: usize) -> Arc<Solid> {
+        Arc::clone(&self.shapes[end])
+    }
+
     /// The shape at time 0 or at time 1.
     fn shape(&self, end: usize) -> &Solid {
-        &self.shapes[self.first + end]
+        &self.shapes[end]
     }
 
     /// The weight of the second shape where both are known.
     fn weight(&self, time: f64) -> f32 {
-        let is_part = self.shapes.len() > 2;
-        if is_part {
+        if self.is_part {
             (time * time * (3.0 - 2.0 * time)) as f32
         } else {
             time as f32

@@ -64,7 +64,7 @@ pub(crate) fn guide(recipe: &Recipe, keyframes: &Keyframes) -> Result<Box<dyn Gu
     let options = options(&solved);
     let trajectory_steps = 2 * options.trajectory_steps;
     let found: Result<SplineField, SplineError> = (|| {
-        let mut solver = Solver::new(problem(&solved, keyframes), weights(&solved), options)?;
+        let mut solver = Solver::new(problem(&solved, keyframes, 0), weights(&solved), options)?;
         for step in 0..solver.steps() {
             solver.advance(step)?;
         }

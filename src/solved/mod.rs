@@ -8,6 +8,7 @@
 //! | `problem.rs` | from a recipe and key frames to what the solver takes |
 //! | `carried.rs` | surfaces and motion of its field between two shapes |
 //! | `sequence.rs` | the same through many key frames |
+//! | `shapes.rs` | the shapes that it carries |
 //! | `guide.rs` | the field as what a network learns first |
 //! | `stored.rs` | its part of a checkpoint |
 //!
@@ -18,12 +19,12 @@ mod guide;
 mod motion;
 mod problem;
 mod sequence;
+mod shapes;
 mod stored;
 #[cfg(test)]
 mod tests;
 
 use std::io;
-use std::sync::Arc;
 
 use isomorph_spline::{Terms, Weights};
 use isomorph_training::data::TrainingData;
@@ -38,8 +39,9 @@ use self::carried::CarriedShapes;
 pub(crate) use self::guide::guide;
 use self::motion::{AnySolver, Field};
 use self::sequence::CarriedSequence;
+use self::shapes::Shapes;
 use crate::recipe::Recipe;
-use crate::shape::{Keyframe, Keyframes, Solid, SolidParts, key_name};
+use crate::shape::{Keyframe, Keyframes, SolidParts, key_name};
 
 /// A field of splines between shapes, solved for step by step.
 pub(crate) struct Solved {
@@ -47,7 +49,7 @@ pub(crate) struct Solved {
     /// Steps done.
     step: usize,
     /// What the field carries; none before the checkpoint of a run that is only looked at is read.
-    shapes: Option<Arc<[Solid]>>,
+    shapes: Option<Shapes>,
 }
 
 /// Where the field is.
@@ -66,20 +68,21 @@ impl Solved {
     /// # Errors
     /// If a shape is neither a closed mesh nor has normals, or the solver refuses the problem.
     pub(crate) fn new(recipe: &Recipe, keyframes: &Keyframes) -> Result<Self, String> {
-        // Arranging the triangles of one shape takes one core.
         let count = keyframes.keys.len();
-        let shapes: Result<Arc<[Solid]>, String> = keyframes
+        let parts: Result<Vec<SolidParts>, String> = keyframes
             .keys
             .par_iter()
             .enumerate()
-            .map(|(k, key)| solid(key, &key_name(k, count)))
+            .map(|(k, key)| parts(key, &key_name(k, count)))
             .collect();
+        let shapes = Shapes::of(parts?);
+        let shapes = shapes.map_err(|k| format!("the {} has no area", key_name(k, count)))?;
         let solver = problem::solver(recipe, keyframes);
         let solver = solver.map_err(|error| format!("velocity.kind = \"spline\": {error}"))?;
         Ok(Self {
             motion: Motion::Sought(solver),
             step: 0,
-            shapes: Some(shapes?),
+            shapes: Some(shapes),
         })
     }
 
@@ -100,7 +103,7 @@ impl Solved {
         }
     }
 
-    fn shapes(&self) -> &Arc<[Solid]> {
+    fn shapes(&self) -> &Shapes {
         self.shapes.as_ref().expect(READ_FIRST)
     }
 }
@@ -178,7 +181,7 @@ impl Trainer for Solved {
                 resumed.map_err(|error| stored::misfit(&error))?;
             }
             motion => {
-                self.shapes = Some(stored::shapes(parts)?.into());
+                self.shapes = Some(stored::shapes(parts)?);
                 *motion = Motion::Found(field);
             }
         }
@@ -192,21 +195,27 @@ impl Trainer for Solved {
     }
 
     fn deformation(&self) -> Box<dyn Deformation> {
-        let shapes = Arc::clone(self.shapes());
-        match self.field() {
-            Field::Pair(field) => Box::new(CarriedShapes::new(field, shapes, 0)),
-            Field::Sequence(field) => Box::new(CarriedSequence::new(&field, &shapes)),
+        match (self.field(), self.shapes().clone()) {
+            (Field::Pair(field), Shapes::Pair(shapes)) => {
+                Box::new(CarriedShapes::new(field, shapes, false))
+            }
+            (Field::Sequence(field), Shapes::Many(shapes)) => {
+                Box::new(CarriedSequence::of(field, shapes))
+            }
+            (Field::Pairs(fields, times), Shapes::Many(shapes)) => {
+                let of = move |s: usize| fields[s].clone();
+                Box::new(CarriedSequence::new(Box::new(of), times, shapes))
+            }
+            _ => unreachable!("there are as many shapes as key frames"),
         }
     }
 }
 
-fn solid(key: &Keyframe, name: &str) -> Result<Solid, String> {
-    let parts = SolidParts::of(key).ok_or_else(|| {
+fn parts(key: &Keyframe, name: &str) -> Result<SolidParts, String> {
+    SolidParts::of(key).ok_or_else(|| {
         format!(
             "velocity.kind = \"spline\": the {name} is no closed mesh, and has no normals that close it; set \
              data.normals to \"auto\", or choose the preset \"quick\""
         )
-    })?;
-    let solid = Solid::new(parts);
-    solid.ok_or_else(|| format!("the {name} has no area"))
+    })
 }

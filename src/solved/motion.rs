@@ -1,7 +1,7 @@
 //! The field of a run between two shapes, or through more, and the solver that finds it.
 
 use isomorph_spline::{
-    SequenceField, SequenceSolver, Solver, SplineError, SplineField, StepReport, Weights,
+    SequenceField, SequenceSolver, Solver, SplineError, SplineField, StepReport, Terms, Weights,
 };
 
 /// A field between two shapes, or through more.
@@ -11,6 +11,8 @@ pub(super) enum Field {
     Pair(SplineField),
     /// Through three or more.
     Sequence(SequenceField),
+    /// From each of three or more to the next, with the times of the key frames.
+    Pairs(Vec<SplineField>, Vec<f64>),
 }
 
 impl Field {
@@ -19,6 +21,7 @@ impl Field {
         match self {
             Self::Pair(field) => field.coefficients(),
             Self::Sequence(field) => field.coefficients(),
+            Self::Pairs(fields, _) => fields.iter().flat_map(SplineField::coefficients).collect(),
         }
     }
 }
@@ -29,6 +32,8 @@ pub(super) enum AnySolver {
     Pair(Box<Solver>),
     /// Through three or more.
     Sequence(Box<SequenceSolver>),
+    /// From each of three or more to the next, with the times of the key frames.
+    Pairs(Vec<Solver>, Vec<f64>),
 }
 
 impl AnySolver {
@@ -37,6 +42,10 @@ impl AnySolver {
         match self {
             Self::Pair(solver) => Field::Pair(solver.field().clone()),
             Self::Sequence(solver) => Field::Sequence(solver.field().clone()),
+            Self::Pairs(solvers, times) => {
+                let fields = solvers.iter().map(|solver| solver.field().clone());
+                Field::Pairs(fields.collect(), times.clone())
+            }
         }
     }
 
@@ -45,6 +54,7 @@ impl AnySolver {
         match self {
             Self::Pair(solver) => solver.weights(),
             Self::Sequence(solver) => solver.weights(),
+            Self::Pairs(solvers, _) => solvers[0].weights(),
         }
     }
 
@@ -56,6 +66,13 @@ impl AnySolver {
         match self {
             Self::Pair(solver) => solver.advance(step),
             Self::Sequence(solver) => solver.advance(step),
+            Self::Pairs(solvers, _) => {
+                let reports: Result<Vec<StepReport>, SplineError> = solvers
+                    .iter_mut()
+                    .map(|solver| solver.advance(step))
+                    .collect();
+                Ok(mean(&reports?))
+            }
         }
     }
 
@@ -73,7 +90,33 @@ impl AnySolver {
             (Self::Sequence(solver), Field::Sequence(field)) => {
                 Some(solver.resume_from(field, step))
             }
+            (Self::Pairs(solvers, times), Field::Pairs(fields, stored)) => {
+                if solvers.len() != fields.len() || *times != stored {
+                    return None;
+                }
+                let each = solvers.iter_mut().zip(fields);
+                Some(
+                    each.map(|(solver, field)| solver.resume_from(field, step))
+                        .collect(),
+                )
+            }
             _ => None,
         }
+    }
+}
+
+/// The means of the terms of steps that were taken side by side.
+fn mean(reports: &[StepReport]) -> StepReport {
+    let share = 1.0 / reports.len() as f64;
+    let mean = |of: fn(&Terms) -> f64| reports.iter().map(|report| share * of(&report.terms)).sum();
+    StepReport {
+        terms: Terms {
+            matching: mean(|terms| terms.matching),
+            on_surface: mean(|terms| terms.on_surface),
+            strain: mean(|terms| terms.strain),
+            divergence: mean(|terms| terms.divergence),
+            screw: mean(|terms| terms.screw),
+        },
+        ..reports[0]
     }
 }

@@ -7,7 +7,7 @@ use isomorph_spline::{
 use isomorph_training::method::spline;
 
 use super::motion::AnySolver;
-use crate::recipe::Recipe;
+use crate::recipe::{Motion, Recipe};
 use crate::shape::Keyframes;
 
 /// Least weight of the strain: without any the field would be free between the samples.
@@ -20,14 +20,23 @@ const LEAST_STRAIN: f64 = 1e-3;
 pub(super) fn solver(recipe: &Recipe, keyframes: &Keyframes) -> Result<AnySolver, SplineError> {
     let (weights, options) = (weights(recipe), options(recipe));
     if keyframes.keys.len() == 2 {
-        let solver = Solver::new(problem(recipe, keyframes), weights, options)?;
+        let solver = Solver::new(problem(recipe, keyframes, 0), weights, options)?;
         return Ok(AnySolver::Pair(Box::new(solver)));
+    }
+    let times: Vec<f64> = keyframes.keys.iter().map(|key| key.time).collect();
+    if spline::keys(recipe).motion == Motion::Pairs {
+        let pair = |k: usize| {
+            let problem = problem(recipe, keyframes, k);
+            Solver::new(problem, weights, options.clone())
+        };
+        let solvers: Result<Vec<_>, SplineError> = (0..times.len() - 1).map(pair).collect();
+        return Ok(AnySolver::Pairs(solvers?, times));
     }
     let problem = SequenceProblem {
         shapes: (0..keyframes.keys.len())
             .map(|k| cloud(keyframes, k))
             .collect(),
-        times: keyframes.keys.iter().map(|key| key.time).collect(),
+        times,
         pairs: (0..keyframes.between.len())
             .map(|k| pairs(recipe, keyframes, k))
             .collect(),
@@ -36,11 +45,11 @@ pub(super) fn solver(recipe: &Recipe, keyframes: &Keyframes) -> Result<AnySolver
     Ok(AnySolver::Sequence(Box::new(solver)))
 }
 
-/// The problem of two shapes.
-pub(super) fn problem(recipe: &Recipe, keyframes: &Keyframes) -> Problem {
+/// The problem of key frame `k` and the next.
+pub(super) fn problem(recipe: &Recipe, keyframes: &Keyframes, k: usize) -> Problem {
     Problem {
-        shapes: [cloud(keyframes, 0), cloud(keyframes, 1)],
-        pairs: pairs(recipe, keyframes, 0),
+        shapes: [cloud(keyframes, k), cloud(keyframes, k + 1)],
+        pairs: pairs(recipe, keyframes, k),
     }
 }
 

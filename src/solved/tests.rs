@@ -407,3 +407,119 @@ fn what_a_scan_does_not_show_moves_with_its_neighbours_and_is_there_at_the_end()
         assert!(off < 0.005, "{off} at {time}");
     }
 }
+
+/// A bumpy sphere that falls faster and faster, at three uneven times.
+fn falling() -> Keyframes {
+    let first: Mesh<f32> = bumpy_sphere(30).moved(|x| x.map(|part| part as f32));
+    let times = [0.0, 0.4, 1.0];
+    let meshes = times.map(|time: f64| {
+        let way = 0.3 * (time * time) as f32;
+        first.moved(|[x, y, z]| [x, y, z - way])
+    });
+    let mut out = keyframes(0.0);
+    out.keys = (times.iter().zip(&meshes))
+        .map(|(time, mesh)| Keyframe {
+            time: *time,
+            cloud: PointCloud {
+                points: mesh.vertices.clone(),
+                normals: Some(mesh.vertex_normals()),
+            },
+            mesh: Some(mesh.clone()),
+            border: Vec::new(),
+        })
+        .collect();
+    out.between = (meshes.windows(2))
+        .map(|two| {
+            let ends = two[0].vertices.iter().zip(&two[1].vertices);
+            ends.map(|(a, b)| (*a, *b)).collect()
+        })
+        .collect();
+    out.confidence = vec![Vec::new(); 2];
+    out
+}
+
+fn of_many(changes: &[&str]) -> Recipe {
+    let shapes = [("a.ply", 0.0), ("b.ply", 0.4), ("c.ply", 1.0)];
+    let mut recipe = Recipe::through(&shapes).expect("three files");
+    let set = ["training.steps=6", "spline.band=2000"];
+    let set = set.iter().chain(changes).map(|change| (*change).to_owned());
+    recipe.with_all(&set.collect::<Vec<_>>()).expect("a recipe");
+    recipe
+}
+
+fn mean_z(points: &[[f32; 3]]) -> f32 {
+    points.iter().map(|x| x[2]).sum::<f32>() / points.len() as f32
+}
+
+#[test]
+fn many_key_frames_have_each_its_own_surface_and_one_smooth_motion() {
+    let keyframes = falling();
+    // At a key frame, just before and just after it: what the speed is, and how much it jumps.
+    let jump = |changes: &[&str]| {
+        let deformation = trained(&of_many(changes), &keyframes).deformation();
+        let field = deformation.field().expect("one");
+        let motion = deformation.motion().expect("one");
+        for key in &keyframes.keys {
+            let off = field.values(&key.cloud.points, key.time).into_iter();
+            let off = off.map(f32::abs).fold(0.0, f32::max);
+            assert!(off < 1e-5, "at the key frame {}: {off}", key.time);
+        }
+        let there = &keyframes.keys[1].cloud.points;
+        let speed = |time: f64| mean_z(&motion.velocities(there, time));
+        let ends = motion.carry(&keyframes.keys[0].cloud.points, 0.0, 1.0);
+        let back = motion.carry(&ends, 1.0, 0.0);
+        let lost = mean_z(&back) - mean_z(&keyframes.keys[0].cloud.points);
+        assert!(lost.abs() < 1e-4, "there and back: {lost}");
+        let path = motion.path(&keyframes.keys[0].cloud.points, &[0.4, 0.4, 1.0]);
+        assert_eq!(path[0], path[1]);
+        assert_eq!(path[2], ends);
+        (speed(0.4 - 1e-6), speed(0.4 + 1e-6))
+    };
+    let (before, after) = jump(&[]);
+    // The true speed is .24; that of straight lines is .12 before the key frame and .42 after it.
+    assert!((before - after).abs() < 1e-4, "{before} {after}");
+    assert!((before + 0.24).abs() < 0.05, "{before}");
+    let (before, after) = jump(&["spline.motion=pairs"]);
+    assert!((before - after).abs() > 0.2, "by pairs: {before} {after}");
+}
+
+#[test]
+fn fields_through_many_key_frames_are_stored_read_and_gone_on_with() {
+    let keyframes = falling();
+    for changes in [&[][..], &["spline.motion=pairs"]] {
+        let recipe = of_many(changes);
+        let whole = trained(&recipe, &keyframes);
+        let mut half = Solved::new(&recipe, &keyframes).expect("shapes");
+        let data = keyframes.training_data();
+        for step in 0..4 {
+            half.advance(&data, step, false);
+        }
+        let records = half.records().expect("stored");
+        let mut resumed = Solved::new(&recipe, &keyframes).expect("shapes");
+        resumed.restore(&records).expect("its own record");
+        for step in 4..6 {
+            resumed.advance(&data, step, false);
+        }
+        assert!(resumed.field() == whole.field(), "the same bits");
+        let mut seen = Solved::unset();
+        seen.restore(&whole.records().expect("stored"))
+            .expect("its own record");
+        assert!(seen.field() == whole.field(), "the same bits");
+        let points = &keyframes.keys[0].cloud.points;
+        let of = |solved: &Solved| {
+            let deformation = solved.deformation();
+            deformation.field().expect("one").values(points, 0.7)
+        };
+        assert_eq!(of(&seen), of(&whole));
+    }
+    // A record of one field is none of two.
+    let one = trained(&of_many(&[]), &keyframes)
+        .records()
+        .expect("stored");
+    let mut two = Solved::new(&of_many(&["spline.motion=pairs"]), &keyframes).expect("shapes");
+    let refused = two.restore(&one).expect_err("another kind").problem;
+    assert!(
+        refused.contains("another number of key frames"),
+        "{refused}"
+    );
+}

@@ -22,37 +22,38 @@ pub(super) fn write_surfaces(
     precision: Precision,
     folder: &Path,
 ) -> Result<(), FramesError> {
-    stills.sort_by(|a, b| a.time.total_cmp(&b.time));
-    // A timeline has each time once.
-    stills.dedup_by_key(|still| still.time);
+    stills.sort_by(|a, b| a.second.total_cmp(&b.second));
+    // A timeline has each moment once.
+    stills.dedup_by_key(|still| still.second);
     let file = gltf::in_turn(&stills, precision)?;
     Ok(write_atomically(&folder.join(SURFACE), |out| {
         out.write_all(&file)
     })?)
 }
 
-/// Writes a shape whose vertices are at `path` at each of `times`, which ascend, with its colours, texture
-/// coordinates, groups and materials.
+/// Writes a shape whose vertices are at `path` at each of `moments`, times and the seconds of the animation in
+/// ascending order, with its colours, texture coordinates, groups and materials.
 ///
 /// # Errors
 /// What the file system says, or a file that would be too large.
 pub(super) fn write_carried(
     shape: &Shape,
-    times: &[f64],
+    moments: &[[f64; 2]],
     mut path: Vec<Vec<[f64; 3]>>,
     precision: Precision,
     folder: &Path,
 ) -> Result<(), FramesError> {
-    let mut once: Vec<f64> = times.to_vec();
-    once.dedup();
-    let mut repeated = times.windows(2).map(|pair| pair[0] == pair[1]);
+    let mut once = moments.to_vec();
+    once.dedup_by_key(|moment| moment[1]);
+    let mut repeated = moments.windows(2).map(|pair| pair[0][1] == pair[1][1]);
     let mut is_first = true;
     path.retain(|_| std::mem::take(&mut is_first) || !repeated.next().unwrap_or(false));
     let look = Appearance::read(shape)?;
     let name = shape.path.file_stem().unwrap_or_default().to_string_lossy();
     let file = gltf::morphing(&Morphing {
         name: &name,
-        times: &once,
+        times: &once.iter().map(|moment| moment[0]).collect::<Vec<_>>(),
+        seconds: &once.iter().map(|moment| moment[1]).collect::<Vec<_>>(),
         positions: &path,
         origin: &look.origin,
         parts: &look.parts,

@@ -43,6 +43,9 @@ impl OutputFormat {
     }
 }
 
+/// How long an animation of two shapes runs, if nothing else is asked for.
+pub(crate) const SECONDS: f64 = 2.0;
+
 /// What to write.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct FrameOptions {
@@ -50,6 +53,8 @@ pub(crate) struct FrameOptions {
     pub times: Vec<f64>,
     /// The same in the user's unit, as they are listed.
     pub names: Vec<f64>,
+    /// When each is shown in an animation, in seconds.
+    pub seconds: Vec<f64>,
     /// The times of the key frames, in `[0, 1]`, if there are more than two.
     pub keys: Vec<f64>,
     /// Cells along the longest side of the box.
@@ -126,6 +131,8 @@ pub(crate) struct Frame {
     pub entry: FrameEntry,
     /// The time, in `[0, 1]`.
     pub time: f64,
+    /// When it is shown in an animation, in seconds.
+    pub second: f64,
     /// The surface in normalised coordinates.
     pub mesh: Mesh<f32>,
     /// Connected pieces.
@@ -149,6 +156,7 @@ impl Frame {
         let agreement = learned.agreement(&found.mesh.vertices, time)?;
         Ok(Self {
             time,
+            second: SECONDS * time,
             entry: FrameEntry {
                 time,
                 key: None,
@@ -260,7 +268,8 @@ fn write_frame(
             write_surface_with(&placed, attributes, &path, format)?;
         }
         OutputFormat::Animation(_) => stills.push(Still {
-            time,
+            time: options.names[k],
+            second: options.seconds[k],
             vertices: placed.vertices,
             normals,
             triangles: placed.triangles,
@@ -270,6 +279,7 @@ fn write_frame(
     let mut frame = Frame::measured(learned, found, time, slope_error)?;
     frame.trust = trust;
     frame.entry.time = options.names[k];
+    frame.second = options.seconds[k];
     frame.entry.key = options.keys.iter().position(|key| *key == time);
     frame.entry.surface = surface;
     frame.entry.carried = carried;
@@ -294,7 +304,9 @@ fn carry(
     let times: Vec<f64> = order.iter().map(|k| options.times[*k]).collect();
     let path = carried_vertices(learned, &shape, *time, &times)?;
     if let OutputFormat::Animation(precision) = options.format {
-        animation::write_carried(&shape, &times, path, precision, &options.folder)?;
+        let moment = |k: &usize| [options.names[*k], options.seconds[*k]];
+        let moments: Vec<[f64; 2]> = order.iter().map(moment).collect();
+        animation::write_carried(&shape, &moments, path, precision, &options.folder)?;
         return Ok(vec![Some(animation::CARRIED.to_owned()); times.len()]);
     }
     let extension = carried_extension(file);
@@ -324,7 +336,7 @@ pub(crate) fn carried_vertices(
         false => [0.0; 3],
     };
     let start: Vec<[f32; 3]> = vertices.iter().map(place).collect();
-    let path = path_from(learned, &start, from, times)?;
+    let path = learned.path_from(&start, from, times)?;
     // The displacement is added to the vertex as it was read, so that time 0 gives the input back.
     let placed = |now: Vec<[f32; 3]>| {
         (vertices.iter().zip(&start).zip(&now))
@@ -332,31 +344,4 @@ pub(crate) fn carried_vertices(
             .collect()
     };
     Ok(path.into_iter().map(placed).collect())
-}
-
-/// Where points of time `from` are at each of `times`, which ascend.
-fn path_from(
-    learned: &Learned,
-    start: &[[f32; 3]],
-    from: f64,
-    times: &[f64],
-) -> Result<Vec<Vec<[f32; 3]>>, FramesError> {
-    if from == 0.0 {
-        return learned.path(start, times);
-    }
-    let after = times.partition_point(|time| *time < from);
-    let mut path = vec![Vec::new(); times.len()];
-    // Away from the shape both ways, each time from the one before.
-    for order in [
-        (0..after).rev().collect::<Vec<_>>(),
-        (after..times.len()).collect(),
-    ] {
-        let (mut at, mut now) = (start.to_vec(), from);
-        for k in order {
-            at = learned.carry(&at, now, times[k])?;
-            now = times[k];
-            path[k] = at.clone();
-        }
-    }
-    Ok(path)
 }

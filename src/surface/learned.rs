@@ -176,6 +176,34 @@ impl Learned {
     ) -> Result<Vec<Vec<[f32; 3]>>, FramesError> {
         Ok(self.motion()?.path(start, times))
     }
+
+    /// Positions at ascending times of points that are at `start` at time `from`, normalised.
+    ///
+    /// # Errors
+    /// [`FramesError::NoMotion`] if the method moves no points.
+    pub(crate) fn path_from(
+        &self,
+        start: &[[f32; 3]],
+        from: f64,
+        times: &[f64],
+    ) -> Result<Vec<Vec<[f32; 3]>>, FramesError> {
+        if from == 0.0 {
+            return self.path(start, times);
+        }
+        let after = times.partition_point(|time| *time < from);
+        let mut path = vec![Vec::new(); times.len()];
+        // Away from the shape both ways, each time from the one before.
+        let (back, on) = ((0..after).rev(), after..times.len());
+        for order in [back.collect::<Vec<_>>(), on.collect()] {
+            let (mut at, mut now) = (start.to_vec(), from);
+            for k in order {
+                at = self.carry(&at, now, times[k])?;
+                now = times[k];
+                path[k].clone_from(&at);
+            }
+        }
+        Ok(path)
+    }
 }
 
 /// The zero set of a field.

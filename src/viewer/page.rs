@@ -20,6 +20,10 @@ pub(crate) struct Page {
     pub date: String,
     /// How long one unit of normalised length is in the unit of the shapes.
     pub unit: f64,
+    /// The times of the first and the last shape, in the run's own unit; all others here are from 0 to 1.
+    pub clock: [f64; 2],
+    /// The times of the key frames, where there are more than two.
+    pub keys: Vec<f64>,
     /// A box around everything.
     pub bounds: Bounds,
     /// The shape at time 0.
@@ -77,7 +81,7 @@ pub(crate) type Values = Vec<(&'static str, Vec<f32>)>;
 /// The measures of a surface, as `frames.json` has them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub(crate) struct Quality {
-    /// Its time.
+    /// Its time, in the run's own unit.
     pub time: f64,
     /// Its triangles, all of them.
     pub triangles: usize,
@@ -146,6 +150,8 @@ impl Page {
             "date": self.date,
             "version": env!("CARGO_PKG_VERSION"),
             "box": {"sides": sides.map(own), "span": own(block.span())},
+            "clock": self.clock,
+            "keys": self.keys,
             "source": end(&self.source, block),
             "target": end(&self.target, block),
             "carried": self.carried.as_ref().map(|track| self.track(track, block)),
@@ -246,6 +252,8 @@ mod tests {
             subtitle: String::new(),
             date: "2026-11-27".to_owned(),
             unit: 2.0,
+            clock: [0.0, 1.0],
+            keys: Vec::new(),
             bounds: Bounds {
                 min: [0.0; 3],
                 max: [1.0, 1.0, 0.5],

@@ -30,5 +30,6 @@ mod progress;
 mod raw_scans;
 mod resume;
 mod samples;
+mod sequences;
 mod support;
 mod viewing;

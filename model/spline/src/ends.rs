@@ -158,7 +158,7 @@ impl<R: Real, const H: usize> EndTerms<R, H> {
         Self {
             moves: vec![[R::ZERO; 4]; places.len()],
             pulls: vec![[R::ZERO; 3]; residuals.len()],
-            parts: parts(&firsts, grid.strides(), &Node::ZERO),
+            parts: parts::<_, H>(&firsts, grid.strides(), &Node::ZERO),
             places,
             slots,
             each: ends.each,
@@ -173,7 +173,7 @@ impl<R: Real, const H: usize> EndTerms<R, H> {
 
     /// How far each place moves its trajectory's end, if the field moves by `nodes`.
     pub(crate) fn move_ends(&mut self, nodes: &[Node<R, H>], strides: [usize; 2]) {
-        let length = run_length(self.places.len());
+        let length = run_length::<H>(self.places.len());
         self.moves
             .par_chunks_mut(length)
             .zip(self.places.par_chunks(length))
@@ -223,7 +223,7 @@ impl<R: Real, const H: usize> EndTerms<R, H> {
 
     fn spread(&mut self, strides: [usize; 2]) {
         let pulls = &self.pulls;
-        each_run(&mut self.parts, &self.places, |part, places| {
+        each_run::<_, _, H>(&mut self.parts, &self.places, |part, places| {
             run(Spread {
                 pulls,
                 strides,

@@ -41,7 +41,7 @@ impl<R: Real> Frozen<R> {
         options: &Options,
         pass: Pass,
     ) -> Self {
-        let targets = Targets::new(&hop.problem, options, &hop.weights, pass.draw);
+        let targets = Targets::new(&hop.shapes, &hop.pairs, options, &hop.weights, pass.draw);
         let steps = hop.trajectory_steps(field, options);
         let ends = Ends::new(field, &targets.starts, &targets.times, steps, false);
         let amount = [options.band_at(pass.level), steps];

@@ -9,7 +9,7 @@ use crate::error::SplineError;
 use crate::field::SplineField;
 use crate::options::{Options, Weights};
 use crate::prior::PriorTerms;
-use crate::problem::Problem;
+use crate::problem::{Cloud, Pairs};
 use crate::real::Real;
 use crate::solver::Terms;
 use crate::system::HopTerms;
@@ -26,7 +26,8 @@ const MOST_STEPS: usize = 24;
 
 /// Two neighbouring shapes.
 pub(crate) struct Hop<R> {
-    pub problem: Problem,
+    pub shapes: [Arc<Cloud>; 2],
+    pub pairs: Pairs,
     /// For the band, in the order of cells.
     pub clouds: [Arc<Vec<[R; 3]>>; 2],
     pub surfaces: [Arc<Surface>; 2],
@@ -81,7 +82,7 @@ impl<R: Real> Hop<R> {
         } = pass;
         let not_finite = |what| SplineError::NotFinite { step, what };
         let weights = &self.weights;
-        let targets = Targets::new(&self.problem, options, weights, draw);
+        let targets = Targets::new(&self.shapes, &self.pairs, options, weights, draw);
         let steps = self.trajectory_steps(field, options);
         let ends = Ends::new(field, &targets.starts, &targets.times, steps, merge);
         let finite = |x: &R| x.wide().is_finite();

@@ -53,8 +53,8 @@ impl<R: Real, const P: usize> NodeBlocks<R, P> {
     ) -> Self {
         let zero = [Node::ZERO; P];
         let firsts: Vec<u32> = ends.places.iter().map(|place| place.first).collect();
-        let mut of_ends = parts(&firsts, strides, &zero);
-        each_run(&mut of_ends, &ends.places, |part, places| {
+        let mut of_ends = parts::<_, H>(&firsts, strides, &zero);
+        each_run::<_, _, H>(&mut of_ends, &ends.places, |part, places| {
             run(EndBlocks {
                 places,
                 weights: &ends.weights,
@@ -67,8 +67,8 @@ impl<R: Real, const P: usize> NodeBlocks<R, P> {
             .iter()
             .map(|place| place.located.first)
             .collect();
-        let mut of_priors = parts(&firsts, strides, &zero);
-        each_run(&mut of_priors, &priors.places, |part, places| {
+        let mut of_priors = parts::<_, H>(&firsts, strides, &zero);
+        each_run::<_, _, H>(&mut of_priors, &priors.places, |part, places| {
             run(PriorBlocks {
                 places,
                 strides,

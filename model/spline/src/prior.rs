@@ -79,7 +79,7 @@ impl<R: Real, const H: usize> PriorTerms<R, H> {
         }
         let firsts: Vec<u32> = order.iter().map(|&(first, _)| first).collect();
         Self {
-            parts: parts(&firsts, field.grid().strides(), &Node::ZERO),
+            parts: parts::<_, H>(&firsts, field.grid().strides(), &Node::ZERO),
             places,
             means,
         }
@@ -91,7 +91,7 @@ impl<R: Real, const H: usize> PriorTerms<R, H> {
 
     /// The parts of the product with the Gauss-Newton matrix.
     pub(crate) fn spread_product(&mut self, nodes: &[Node<R, H>], strides: [usize; 2]) {
-        each_run(&mut self.parts, &self.places, |part, places| {
+        each_run::<_, _, H>(&mut self.parts, &self.places, |part, places| {
             run(Product {
                 nodes,
                 strides,
@@ -103,7 +103,7 @@ impl<R: Real, const H: usize> PriorTerms<R, H> {
 
     /// The parts of the gradient.
     pub(crate) fn spread_gradient(&mut self, strides: [usize; 2]) {
-        each_run(&mut self.parts, &self.places, |part, places| {
+        each_run::<_, _, H>(&mut self.parts, &self.places, |part, places| {
             run(Gradient {
                 strides,
                 places,

@@ -34,55 +34,78 @@ pub struct Problem {
     pub pairs: Pairs,
 }
 
-impl Problem {
+impl Cloud {
     /// # Errors
-    /// If a shape is empty, lists differ in length or a number is not finite.
-    pub(crate) fn check(&self) -> Result<(), SplineError> {
-        for (cloud, which) in self.shapes.iter().zip(["source", "target"]) {
-            if cloud.points.is_empty() {
-                return Err(SplineError::Empty { which });
-            }
-            check_finite("point", &cloud.points)?;
-            if let Some(normals) = &cloud.normals {
-                check_length("normals", normals.len(), cloud.points.len())?;
-                check_finite("normal", normals)?;
-            }
-            if !cloud.border.is_empty() {
-                check_length("border", cloud.border.len(), cloud.points.len())?;
-            }
+    /// If it is empty, lists differ in length or a number is not finite.
+    pub(crate) fn check(&self, which: &'static str) -> Result<(), SplineError> {
+        if self.points.is_empty() {
+            return Err(SplineError::Empty { which });
         }
-        let pairs = &self.pairs;
-        check_length("pairs' targets", pairs.target.len(), pairs.source.len())?;
-        check_finite("pair's source", &pairs.source)?;
-        check_finite("pair's target", &pairs.target)?;
-        if !pairs.confidence.is_empty() {
-            check_length("confidence", pairs.confidence.len(), pairs.source.len())?;
+        check_finite("point", &self.points)?;
+        if let Some(normals) = &self.normals {
+            check_length("normals", normals.len(), self.points.len())?;
+            check_finite("normal", normals)?;
+        }
+        if !self.border.is_empty() {
+            check_length("border", self.border.len(), self.points.len())?;
+        }
+        Ok(())
+    }
+}
+
+impl Pairs {
+    /// # Errors
+    /// If lists differ in length, a number is not finite or a confidence below 0.
+    pub(crate) fn check(&self) -> Result<(), SplineError> {
+        check_length("pairs' targets", self.target.len(), self.source.len())?;
+        check_finite("pair's source", &self.source)?;
+        check_finite("pair's target", &self.target)?;
+        if !self.confidence.is_empty() {
+            check_length("confidence", self.confidence.len(), self.source.len())?;
         }
         let wrong = |&c: &f32| !(c.is_finite() && c >= 0.0);
-        if let Some(index) = pairs.confidence.iter().position(wrong) {
+        if let Some(index) = self.confidence.iter().position(wrong) {
             return Err(SplineError::Input {
                 what: "confidence",
                 index,
-                found: pairs.confidence[index].to_string(),
+                found: self.confidence[index].to_string(),
                 also: " and 0 or more",
             });
         }
         Ok(())
     }
+}
+
+impl Problem {
+    /// # Errors
+    /// Those of [`Cloud::check`] and [`Pairs::check`].
+    pub(crate) fn check(&self) -> Result<(), SplineError> {
+        for (cloud, which) in self.shapes.iter().zip(["source", "target"]) {
+            cloud.check(which)?;
+        }
+        self.pairs.check()
+    }
 
     /// The corners of the box of all points.
     pub(crate) fn extent(&self) -> [[f64; 3]; 2] {
-        let (mut lower, mut upper) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        let [first, second] = &self.shapes;
-        let all = first.points.iter().chain(&second.points);
-        for point in all.chain(&self.pairs.source).chain(&self.pairs.target) {
-            for i in 0..3 {
-                lower[i] = lower[i].min(f64::from(point[i]));
-                upper[i] = upper[i].max(f64::from(point[i]));
-            }
-        }
-        [lower, upper]
+        extent(self.shapes.iter(), [&self.pairs].into_iter())
     }
+}
+
+/// The corners of the box of all points.
+pub(crate) fn extent<'a>(
+    shapes: impl Iterator<Item = &'a Cloud>,
+    pairs: impl Iterator<Item = &'a Pairs>,
+) -> [[f64; 3]; 2] {
+    let (mut lower, mut upper) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    let known = pairs.flat_map(|pairs| pairs.source.iter().chain(&pairs.target));
+    for point in shapes.flat_map(|shape| &shape.points).chain(known) {
+        for i in 0..3 {
+            lower[i] = lower[i].min(f64::from(point[i]));
+            upper[i] = upper[i].max(f64::from(point[i]));
+        }
+    }
+    [lower, upper]
 }
 
 fn check_length(what: &'static str, found: usize, wanted: usize) -> Result<(), SplineError> {

@@ -73,7 +73,7 @@ impl<R: Real> Solver<R> {
     pub fn samples(&self, step: usize) -> Result<Samples<R>, SplineError> {
         let (field, level) = self.field_at(step)?;
         let (hop, options) = (self.hop(), self.options());
-        let targets = Targets::new(&hop.problem, options, &hop.weights, step);
+        let targets = Targets::new(&hop.shapes, &hop.pairs, options, &hop.weights, step);
         let steps = hop.trajectory_steps(&field, options);
         let ends = Ends::new(&field, &targets.starts, &targets.times, steps, false);
         let (pairs, surface) = targets.arrivals(&ends, &hop.surfaces);

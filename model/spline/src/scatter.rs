@@ -1,6 +1,6 @@
 //! Sums of many places into one grid, on all cores, with the same bits on any number of them.
 //!
-//! Places are sorted by cell and divided into [`CHUNKS`] even runs. A run touches only a contiguous range of
+//! Places are sorted by cell and divided into even runs, [`chunks`]. A run touches only a contiguous range of
 //! nodes, so that its private copy of them is small. The copies are added up in order.
 
 use rayon::prelude::*;
@@ -9,8 +9,11 @@ use crate::basis::SUPPORT;
 use crate::cell::{LANES, Node};
 use crate::real::{Fuse, Kernel, Real, run};
 
-/// Runs of places: also the most cores that share a pass.
-pub(crate) const CHUNKS: usize = 16;
+/// Runs of places: also the most cores that share a pass. Of many key frames there are hops to share, and private
+/// copies of nodes are what takes memory.
+const fn chunks(halves: usize) -> usize {
+    if halves == 1 { 16 } else { 4 }
+}
 
 /// Nodes that a thread adds up at a time.
 pub(crate) const BLOCK: usize = 512;
@@ -23,12 +26,16 @@ pub(crate) struct Part<T> {
 }
 
 /// Places in a run, of so many in all.
-pub(crate) fn run_length(places: usize) -> usize {
-    places.div_ceil(CHUNKS).max(1)
+pub(crate) fn run_length<const H: usize>(places: usize) -> usize {
+    places.div_ceil(chunks(H)).max(1)
 }
 
 /// The private copies for places whose first nodes, sorted, are these.
-pub(crate) fn parts<T: Clone>(firsts: &[u32], strides: [usize; 2], zero: &T) -> Vec<Part<T>> {
+pub(crate) fn parts<T: Clone, const H: usize>(
+    firsts: &[u32],
+    strides: [usize; 2],
+    zero: &T,
+) -> Vec<Part<T>> {
     let beyond = (SUPPORT - 1) * (strides[0] + strides[1] + 1) + 1;
     let part = |run: &[u32]| {
         let start = run[0] as usize;
@@ -38,7 +45,8 @@ pub(crate) fn parts<T: Clone>(firsts: &[u32], strides: [usize; 2], zero: &T) -> 
             nodes: vec![zero.clone(); end - start],
         }
     };
-    firsts.chunks(run_length(firsts.len())).map(part).collect()
+    let length = run_length::<H>(firsts.len());
+    firsts.chunks(length).map(part).collect()
 }
 
 impl<R: Real, const H: usize> Part<Node<R, H>> {
@@ -59,14 +67,14 @@ pub(crate) fn by_first(firsts: impl Iterator<Item = u32>) -> Vec<(u32, u32)> {
 }
 
 /// Gives each run of sorted places to `spread`, with its private copy of the nodes, on all cores.
-pub(crate) fn each_run<S: Send, T: Sync>(
+pub(crate) fn each_run<S: Send, T: Sync, const H: usize>(
     parts: &mut [Part<S>],
     places: &[T],
     spread: impl Fn(&mut Part<S>, &[T]) + Sync,
 ) {
     parts
         .par_iter_mut()
-        .zip(places.par_chunks(run_length(places.len())))
+        .zip(places.par_chunks(run_length::<H>(places.len())))
         .for_each(|(part, places)| spread(part, places));
 }
 

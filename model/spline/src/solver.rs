@@ -102,7 +102,8 @@ impl<R: Real> Solver<R> {
             hop: Hop {
                 clouds: [cloud(0), cloud(1)],
                 surfaces: [Arc::new(first), Arc::new(second)],
-                problem,
+                shapes: problem.shapes.map(Arc::new),
+                pairs: problem.pairs,
                 weights,
             },
             field: SplineField::zero(grid, options.time),

@@ -21,7 +21,7 @@ use rayon::prelude::*;
 use crate::band::{Purpose, random};
 use crate::ends::Ends;
 use crate::options::{Options, Weights};
-use crate::problem::{Cloud, Problem};
+use crate::problem::{Cloud, Pairs};
 use crate::real::Real;
 use crate::samples::Arrival;
 use crate::trajectory::{Matrix, diagonal};
@@ -78,7 +78,8 @@ pub(crate) struct Residuals<R> {
 
 impl<R: Real> Targets<R> {
     pub(crate) fn new(
-        problem: &Problem,
+        shapes: &[Arc<Cloud>; 2],
+        pairs: &Pairs,
         options: &Options,
         weights: &Weights,
         step: usize,
@@ -90,7 +91,6 @@ impl<R: Real> Targets<R> {
             confidence: Vec::new(),
             samples: Vec::new(),
         };
-        let pairs = &problem.pairs;
         if weights.matching > 0.0 {
             let both = [
                 (&pairs.source, &pairs.target),
@@ -111,7 +111,7 @@ impl<R: Real> Targets<R> {
             } else {
                 options.surface_samples
             };
-            for (end, cloud) in problem.shapes.iter().enumerate() {
+            for (end, cloud) in shapes.iter().enumerate() {
                 let mut rng = random(options.seed, step, Purpose::Surface, end);
                 let count = cloud.points.len();
                 for at in index::sample(&mut rng, count, most.min(count)) {

@@ -182,6 +182,7 @@ fn textured(precision: Precision) -> (Vec<u8>, Vec<[f32; 2]>, Vec<[f32; 4]>) {
     let file = morphing(&Morphing {
         name: "square",
         times: &[0.0, 1.0],
+        seconds: &[0.0, 2.0],
         positions: &[places, moved],
         origin: &[0, 1, 2, 0, 2, 3],
         parts: &[part("a", vec![[0, 1, 2]]), part("b", vec![[3, 4, 5]])],

@@ -16,6 +16,7 @@ fn square(by: f64) -> Vec<[f64; 3]> {
 }
 
 const TIMES: [f64; 3] = [0.0, 0.25, 1.0];
+const SECONDS: [f64; 3] = [0.0, 0.5, 2.0];
 
 fn positions() -> Vec<Vec<[f64; 3]>> {
     TIMES.iter().map(|time| square(*time)).collect()
@@ -38,6 +39,7 @@ fn with<'a>(
     let mut scene = Morphing {
         name: "square",
         times: &TIMES[..positions.len()],
+        seconds: &SECONDS[..positions.len()],
         positions,
         origin: &[0, 1, 2, 3],
         parts,

@@ -43,7 +43,8 @@ class Surface(tuple):
 
 
 class Run:
-    """The motion between two shapes. Times are 0 (the source) to 1 (the target), coordinates those of the shapes.
+    """The motion between two shapes, or through more. Times are 0 (the source) to 1 (the target), or in the unit of the
+    recipe's key frames. Coordinates are those of the shapes.
 
     Several threads may use one run. A copy, and what is unpickled, opens the folder again.
     """
@@ -59,6 +60,14 @@ class Run:
         return Path(self._native.path())
 
     @property
+    def times(self) -> list[float]:
+        """The times of the key frames: `[0.0, 1.0]`, or those that the recipe gives."""
+        return self._native.key_times()
+
+    def _half_way(self, t: float | None) -> float:
+        return (self.times[0] + self.times[-1]) / 2 if t is None else float(t)
+
+    @property
     def recipe(self) -> str:
         """The recipe, every key with its value, as TOML."""
         return self._native.recipe()
@@ -68,21 +77,25 @@ class Run:
         """The logged steps: `step`, `seconds`, `total`, `terms` and more."""
         return [json.loads(line) for line in self._native.metrics()]
 
-    def surface(self, t: float = 0.5, resolution: int = 192) -> Surface:
-        """The surface at a time. resolution: cells of the grid along the longest side of the box, 8 to 2048."""
-        return Surface(*self._native.surface(t, resolution))
+    def surface(self, t: float | None = None, resolution: int = 192) -> Surface:
+        """The surface at a time, half-way without one. resolution: cells of the grid along the longest side of the box, 8 to 2048."""
+        return Surface(*self._native.surface(self._half_way(t), resolution))
 
-    def carry(self, points: Any, start: float = 0.0, end: float = 1.0) -> np.ndarray:
-        """Where points `(n, 3)` that are given at time `start` are at time `end`, `(n, 3)`."""
+    def carry(self, points: Any, start: float | None = None, end: float | None = None) -> np.ndarray:
+        """Where points `(n, 3)` that are given at time `start` are at time `end`, `(n, 3)`: from the first shape to the
+        last without them.
+        """
+        first, *_, last = self.times
+        start, end = (first if start is None else float(start)), (last if end is None else float(end))
         return self._native.carry(rows("points", points, np.float64), start, end)
 
-    def velocity(self, points: Any, t: float = 0.5) -> np.ndarray:
+    def velocity(self, points: Any, t: float | None = None) -> np.ndarray:
         """The velocity `(n, 3)` of what is at `points` at time `t`, in units of length per unit of time."""
-        return self._native.velocity(rows("points", points, np.float64), t)
+        return self._native.velocity(rows("points", points, np.float64), self._half_way(t))
 
-    def distance(self, points: Any, t: float = 0.5) -> tuple[np.ndarray, np.ndarray]:
+    def distance(self, points: Any, t: float | None = None) -> tuple[np.ndarray, np.ndarray]:
         """The signed distance `(n,)` of points from the surface at a time, negative inside, and its gradient `(n, 3)`."""
-        return self._native.distance(rows("points", points, np.float64), t)
+        return self._native.distance(rows("points", points, np.float64), self._half_way(t))
 
     def save_glb(
         self,

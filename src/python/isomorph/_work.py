@@ -6,7 +6,7 @@ import os
 import warnings
 from hashlib import sha256
 from pathlib import Path
-from typing import Any, Callable, Mapping
+from typing import Any, Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -23,8 +23,9 @@ class IsomorphWarning(UserWarning):
 def morph(
     source: ShapeLike,
     target: ShapeLike,
-    *,
+    *more: ShapeLike,
     preset: str = "instant",
+    times: Sequence[float] | None = None,
     pairs: Any = None,
     run: str | os.PathLike[str] | None = None,
     overwrite: bool = False,
@@ -33,17 +34,20 @@ def morph(
     on_event: Callable[[dict], object] | None = None,
     progress: bool | None = None,
 ) -> Run:
-    """Computes the motion from one shape to another.
+    """Computes the motion from one shape to another, or through more of them, smoothly.
 
-    preset: "instant" (seconds), "quick", "default" (minutes) or "quality". pairs: corresponding points as an array
+    times: of the shapes, in any unit, ascending; 0, 1, 2 and so on without it. More than two shapes take the preset
+    "instant". preset: "instant" (seconds), "quick", "default" (minutes) or "quality". pairs: corresponding points as an array
     `(n, 2)` of vertex numbers or the path of a file; "same-vertices", "match" (found) or "none"; chosen by the shapes
     without it. run: the folder [runs/SOURCE-TARGET]. frames: surfaces that are written into it. settings: keys of the
     recipe, as in `{"training": {"steps": 2000}}` or `{"training.steps": 2000}`.
     """
-    run = Path(run) if run else Path("runs") / f"{name_of(source, 'source')}-{name_of(target, 'target')}"
+    run = Path(run) if run else Path("runs") / f"{name_of(source, 'source')}-{name_of(more[-1] if more else target, 'target')}"
     kept = Kept(run)
     files = [kept.shape(source, "source"), kept.shape(target, "target")]
-    text, assumed, doubts = _native.plan(*files, preset, kept.pairs(pairs), frames, changes(settings))
+    files += [kept.shape(shape, f"shape-{number}") for number, shape in enumerate(more, 2)]
+    times = None if times is None else [float(time) for time in times]
+    text, assumed, doubts = _native.plan(files, times, preset, kept.pairs(pairs), frames, changes(settings))
     notes = list(assumed)
     for finding, cure in doubts:
         notes.append(f"doubtful: {finding}; {cure}")

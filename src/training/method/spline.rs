@@ -8,7 +8,7 @@ use super::spec::{Acts, Keys, MethodSpec, Needs};
 use super::spec_of;
 use crate::recipe::rule::Rule;
 use crate::recipe::schema::section;
-use crate::recipe::{Recipe, VelocityKind};
+use crate::recipe::{Motion, Recipe, VelocityKind};
 
 /// The most steps: Gauss-Newton has converged long before.
 pub(crate) const MOST_STEPS: usize = 200;
@@ -44,6 +44,7 @@ pub(super) static SPLINE: MethodSpec = MethodSpec {
         ),
         ("spline.spacing", "a field keeps its grid"),
         ("spline.coarse-shares", "a field keeps its grid"),
+        ("spline.motion", "one field, or several"),
     ],
     // Presets of networks have far more steps.
     changes: &["training.steps=18"],
@@ -72,6 +73,10 @@ section! {
         /// the share of the steps still left that its level takes.
         coarse_shares: Vec<f64> = [0.45, 0.4] | [0.45, 0.4] | [0.45, 0.4] | [0.45, 0.4] | [0.45, 0.4],
             Rule::list(0.0, 0.9);
+        /// The motion through more than two key frames. "smooth": one field through all of them, whose speed has no
+        /// jump. "pairs": from each to the next by itself, for cuts and comparisons.
+        motion: Motion = "smooth" | "smooth" | "smooth" | "smooth" | "smooth",
+            Rule::word(Motion::WORDS);
         /// Samples of the space around the moving surface in each step, where the regularisers act.
         band: usize = 24_000 | 24_000 | 24_000 | 24_000 | 24_000, Rule::whole(100, 10_000_000);
         /// Points of each surface in each step that must arrive on the other one.

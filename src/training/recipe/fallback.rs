@@ -32,6 +32,11 @@ impl Fallback {
         many.or_else(|| key.preset_value(self.preset))
     }
 
+    /// Whether there are more than two key frames, and values of theirs.
+    pub(super) fn is_of_many(&self) -> bool {
+        !self.many.is_empty()
+    }
+
     /// Where such a value comes from.
     pub(super) fn place(&self) -> Place {
         Place::Preset(self.preset)

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use super::data::{KEYFRAME, KeyframeRecipe};
 use super::entry::{Entries, Entry, keyframe_id};
 use super::error::RecipeError;
+use super::files;
 use super::keys::DataKeys;
 use super::rule::Value;
 use super::schema::{Key, Keyed};
@@ -109,7 +110,20 @@ fn of_sequence(
     known: Correspondences,
 ) -> Result<Frames, RecipeError> {
     let file = text(entries.get("data.sequence"), data("sequence"), origin)?;
+    if let (Correspondences::File(_), Some(entry)) = (&known, entries.get("data.correspondences")) {
+        return Err(RecipeError::Refused {
+            at: entry.about(),
+            allowed: "\"none\", \"same-vertices\" or \"match\" where a sequence is given"
+                .to_owned(),
+        });
+    }
+    let many = files::stands_for_many(&file);
     let entry = entries.get("data.keys");
+    if entry.is_none() && many {
+        let all = files_of(entries, &file)?;
+        let keys: Vec<usize> = (0..all.len()).collect();
+        return of_files(entries, &all, &keys, &known);
+    }
     let entry = entry.ok_or_else(|| missing(data("keys"), origin))?;
     let Value::Numbers(keys) = &entry.value else {
         return Err(missing(data("keys"), origin));
@@ -122,12 +136,15 @@ fn of_sequence(
             allowed: "at least two whole numbers in ascending order".to_owned(),
         });
     }
-    if let (Correspondences::File(_), Some(entry)) = (&known, entries.get("data.correspondences")) {
-        return Err(RecipeError::Refused {
-            at: entry.about(),
-            allowed: "\"none\", \"same-vertices\" or \"match\" where a sequence is given"
-                .to_owned(),
-        });
+    if many {
+        let all = files_of(entries, &file)?;
+        let keys: Vec<usize> = keys.iter().map(|key| *key as usize).collect();
+        if let Some(beyond) = keys.iter().find(|key| **key >= all.len()) {
+            let count = all.len();
+            let problem = format!("there is no frame {beyond}: {count} files, counted from 0");
+            return Err(wrong(entry, problem));
+        }
+        return of_files(entries, &all, &keys, &known);
     }
     let frames = keys.iter().map(|key| KeyframeRecipe {
         file: file.clone(),
@@ -135,6 +152,36 @@ fn of_sequence(
         time: *key,
     });
     Ok((frames.collect(), vec![known; keys.len() - 1]))
+}
+
+/// The files of a folder or a pattern.
+fn files_of(entries: &Entries, path: &Path) -> Result<Vec<PathBuf>, RecipeError> {
+    let entry = entries
+        .get("data.sequence")
+        .expect("the path came from there");
+    files::listed(path).map_err(|reason| wrong(entry, reason))
+}
+
+/// Some of these files, each at the time that is its number.
+fn of_files(
+    entries: &Entries,
+    all: &[PathBuf],
+    keys: &[usize],
+    known: &Correspondences,
+) -> Result<Frames, RecipeError> {
+    if keys.len() < 2
+        && let Some(entry) = entries.get("data.sequence")
+    {
+        let count = all.len();
+        let problem = format!("there are {count} shapes in this place; give two or more");
+        return Err(wrong(entry, problem));
+    }
+    let frames = keys.iter().map(|key| KeyframeRecipe {
+        file: all[*key].clone(),
+        frame: None,
+        time: *key as f64,
+    });
+    Ok((frames.collect(), vec![known.clone(); keys.len() - 1]))
 }
 
 /// Where the recipe names its key frames.

@@ -3,8 +3,9 @@
 //! Keys are written with their sections, as in `--set`: so a key may stand at the top, whatever section it
 //! is of.
 
-use std::path::Path;
+use std::path::PathBuf;
 
+use super::fallback::Fallback;
 use super::print::{about, comment};
 use super::rule::Value;
 use super::schema::{Key, Section};
@@ -79,8 +80,7 @@ impl Recipe {
     /// # Errors
     /// If a path is not Unicode.
     pub fn commented(
-        source: &Path,
-        target: &Path,
+        shapes: &[PathBuf],
         correspondences: &Correspondences,
         preset: Preset,
         all: bool,
@@ -88,9 +88,11 @@ impl Recipe {
         if let Correspondences::File(path) = correspondences {
             unicode(path)?;
         }
+        let spec = chosen(preset);
         let page = Page {
             preset,
-            spec: chosen(preset),
+            spec,
+            fallback: Fallback::new(preset, spec, shapes.len()),
             correspondences: correspondences.to_value(),
         };
         let mut text = comment(
@@ -98,10 +100,15 @@ impl Recipe {
              To change it, remove the first # and edit the value. Each key is written with its section, as \
              in `--set`. `isomorph train FILE` starts the run.",
         );
-        for (id, path) in [("data.source", source), ("data.target", target)] {
-            let key = catalogue::by_id(id).expect("a key of the table");
-            let path = Value::Text(unicode(path)?.to_owned());
-            text.push_str(&format!("\n{}{id} = {path}\n", about(key, key.doc)));
+        match shapes {
+            [source, target] => {
+                for (id, path) in [("data.source", source), ("data.target", target)] {
+                    let key = catalogue::by_id(id).expect("a key of the table");
+                    let path = Value::Text(unicode(path)?.to_owned());
+                    text.push_str(&format!("\n{}{id} = {path}\n", about(key, key.doc)));
+                }
+            }
+            many => text.push_str(&key_frames(many)?),
         }
         text.push_str(&title("The keys that people change"));
         text.push('\n');
@@ -124,6 +131,23 @@ impl Recipe {
     }
 }
 
+/// The list of key frames, one on each line, at the times 0, 1, 2 and so on.
+fn key_frames(shapes: &[PathBuf]) -> Result<String, RecipeError> {
+    let mut text = format!(
+        "\n{}data.keyframe = [\n",
+        comment(
+            "The key frames, in the order of their times. Times are in any unit, such as seconds or frame numbers, and \
+             may be uneven. A key frame can have `correspondences` of its own, to the next one."
+        )
+    );
+    for (time, path) in shapes.iter().enumerate() {
+        let file = Value::Text(unicode(path)?.to_owned());
+        text.push_str(&format!("  {{ file = {file}, time = {time} }},\n"));
+    }
+    text.push_str("]\n");
+    Ok(text)
+}
+
 /// The method of a preset as it is.
 fn chosen(preset: Preset) -> &'static MethodSpec {
     let value = |key: &Key| key.preset_value(preset);
@@ -143,6 +167,7 @@ fn chosen(preset: Preset) -> &'static MethodSpec {
 struct Page {
     preset: Preset,
     spec: &'static MethodSpec,
+    fallback: Fallback,
     correspondences: Option<Value>,
 }
 
@@ -155,7 +180,7 @@ impl Page {
             _ => None,
         };
         let mark = if decided.is_some() { "" } else { "#" };
-        let Some(value) = decided.or_else(|| key.preset_value(self.preset)) else {
+        let Some(value) = decided.or_else(|| self.fallback.value(key)) else {
             return String::new();
         };
         let elsewhere = self.other_presets(key, &value);
@@ -207,6 +232,8 @@ impl Page {
             .iter()
             .copied()
             .filter(|other| *other != self.preset && !matches!(key.section, "" | "data"))
+            // Networks take two shapes.
+            .filter(|_| !self.fallback.is_of_many())
             .filter_map(|other| Some((other, key.preset_value(other)?)))
             .filter(|(_, there)| there != value)
             .map(|(other, there)| format!("{other}: {there}"))

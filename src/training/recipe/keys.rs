@@ -63,10 +63,12 @@ section! {
         source: Option<PathBuf> = _ | _ | _ | _ | _, Rule::path();
         /// Shape at time 1.
         target: Option<PathBuf> = _ | _ | _ | _ | _, Rule::path();
-        /// A sequence of shapes, of which some frames are the key frames: a .anime file, or a
-        /// pattern of files such as "scans/*.ply". It replaces source and target.
+        /// A sequence of shapes, of which some frames are the key frames: a .anime file, a folder, or a
+        /// pattern of files such as "scans/*.ply", in the order of the numbers in their names. It replaces source
+        /// and target.
         sequence: Option<PathBuf> = _ | _ | _ | _ | _, Rule::path();
-        /// The frames of the sequence that are key frames, counted from 0, in ascending order.
+        /// The frames of the sequence that are key frames, counted from 0, in ascending order. Their numbers are
+        /// their times. All files of a folder or a pattern without it.
         keys: Option<Vec<f64>> = _ | _ | _ | _ | _, Rule::list(0.0, MANY as f64);
         /// Known correspondences. "none": no pairs. "same-vertices": vertices of equal number are
         /// pairs. "match": isomorph finds pairs before training. A path: a file with

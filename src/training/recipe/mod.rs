@@ -44,6 +44,7 @@ mod data;
 mod entry;
 mod error;
 mod fallback;
+mod files;
 mod frames;
 mod init;
 mod keys;
@@ -63,6 +64,7 @@ use std::fmt;
 
 pub use data::{DataRecipe, KeyframeRecipe};
 pub use error::RecipeError;
+pub use files::natural_order;
 pub use isomorph_model::operators::Derivatives;
 pub use isomorph_model::trajectory::Integrator;
 pub use keys::{
@@ -70,7 +72,7 @@ pub use keys::{
 };
 pub use words::{
     Activation, Cleaning, Correspondences, DERIVATIVES, GeometryKind, INTEGRATORS, LevelSetForm,
-    NormalSource, Optimiser, Preset, Schedule, TimeSampling, VelocityKind,
+    Motion, NormalSource, Optimiser, Preset, Schedule, TimeSampling, VelocityKind,
 };
 
 use rule::Value;

@@ -66,17 +66,17 @@ impl Recipe {
         Ok((recipe, notes))
     }
 
-    /// The preset "instant" through three or more shapes, at the times 0, 1, 2 and so on.
+    /// The preset "instant" through shapes at ascending times, their paths made absolute.
     ///
     /// # Errors
-    /// If there are fewer than two shapes, a path is not Unicode, or cannot be made absolute.
-    pub fn through(shapes: &[impl AsRef<Path>]) -> Result<Recipe, RecipeError> {
+    /// If there are fewer than two shapes, times do not ascend, or a path is not Unicode.
+    pub fn through<P: AsRef<Path>>(shapes: &[(P, f64)]) -> Result<Recipe, RecipeError> {
         let mut entries = Entries::new();
         let instant = Preset::Instant.to_value().expect("a word");
         entries.insert(PRESET.id(), Entry::new(&PRESET, instant, Place::Held));
-        for (index, path) in shapes.iter().enumerate() {
+        for (index, (path, time)) in shapes.iter().enumerate() {
             let file = Value::Text(source::unicode(path.as_ref())?.to_owned());
-            let values = [file, Value::Number(index as f64)];
+            let values = [file, Value::Number(*time)];
             for (key, value) in KEYFRAME.iter().zip(values) {
                 let entry = Entry::new(key, value, Place::Held);
                 entries.insert(keyframe_id(index, key), entry);

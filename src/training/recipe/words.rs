@@ -140,6 +140,14 @@ words! {
         Step = "step",
     }
 
+    /// How the motion through many key frames is found.
+    Motion {
+        /// One field through all of them, smooth in time.
+        Smooth = "smooth",
+        /// From each to the next by itself; the speed may jump at a key frame.
+        Pairs = "pairs",
+    }
+
     /// The times at which the terms between the shapes are sampled.
     TimeSampling {
         /// Uniform in [0, 1], with a share exactly at both ends.

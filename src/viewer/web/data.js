@@ -56,3 +56,11 @@ export function blend(out, frames, [a, b, share]) {
   const [from, to] = [frames[a], frames[b]];
   for (let k = 0; k < out.length; k++) out[k] = from[k] + share * (to[k] - from[k]);
 }
+
+/** A time of the page, 0 to 1, as the run counts: with three decimals, fewer where times are large. */
+export function ownTime(run, t) {
+  const [first, last] = run.clock;
+  const length = Math.abs(last - first);
+  const digits = Math.min(3, Math.max(0, 3 - Math.floor(Math.log10(length))));
+  return (first + t * (last - first)).toFixed(digits);
+}

@@ -2,7 +2,7 @@
 
 import { gradient, THEMES } from './colours.js';
 import { drawCurves, significant } from './curves.js';
-import { readRun } from './data.js';
+import { readRun, ownTime } from './data.js';
 import { startPicking } from './pick.js';
 import { canRecord, savePicture, saveVideo } from './save.js';
 import { Stage, VIEWS } from './stage.js';
@@ -60,11 +60,12 @@ function start() {
   stage.onTurn = redraw;
 
   // ---- time
+  const named = (t) => `t = ${ownTime(run, t)}`;
   const set = (t) => {
     state.t = Math.min(1, Math.max(0, t));
     $('time').value = state.t;
-    $('time').setAttribute('aria-valuetext', `t = ${state.t.toFixed(3)}`);
-    $('now').textContent = `t = ${state.t.toFixed(3)}`;
+    $('time').setAttribute('aria-valuetext', named(state.t));
+    $('now').textContent = named(state.t);
     describe();
     redraw();
   };
@@ -81,7 +82,7 @@ function start() {
     if (state.show.has('surface')) {
       const { time } = run.surfaces[stage.nearestSurface(state.t)];
       const moved = Math.abs(time - state.t) > 5e-4;
-      words.push(`Surface found at t = ${Number(time.toFixed(3))}${moved ? (run.moves ? ', moved to now by the motion' : '') : ''}`);
+      words.push(`Surface found at t = ${Number(ownTime(run, time))}${moved ? (run.moves ? ', moved to now by the motion' : '') : ''}`);
     }
     if (state.show.has('carried')) words.push(run.carried.triangles ? 'Source mesh carried by the motion' : 'Source points carried by the motion');
     const text = words.join('. ');
@@ -93,7 +94,12 @@ function start() {
   $('play').addEventListener('click', () => play(!state.playing));
   $('speed').addEventListener('change', (event) => { state.speed = Number(event.target.value); });
   for (const { time } of run.surfaces) {
-    const tick = make('i', { title: `surface at t = ${time}` });
+    const tick = make('i', { title: `surface at t = ${Number(ownTime(run, time))}` });
+    tick.style.left = `${100 * time}%`;
+    $('ticks').append(tick);
+  }
+  for (const time of run.keys) {
+    const tick = make('i', { className: 'key', title: `key frame at t = ${Number(ownTime(run, time))}` });
     tick.style.left = `${100 * time}%`;
     $('ticks').append(tick);
   }
@@ -132,7 +138,7 @@ function start() {
     const most = stage.scaleOf(state.colour);
     $('scale-name').textContent = words;
     $('scale-bar').style.background = gradient;
-    $('scale-most').textContent = percent ? `${significant(most)} %` : `${significant(most * (['speed'].includes(state.colour) ? run.span : 1))} ${per ? 'lengths / time' : 'lengths'}`;
+    $('scale-most').textContent = percent ? `${significant(most)} %` : `${significant(most * (['speed'].includes(state.colour) ? run.span / (run.clock[1] - run.clock[0]) : 1))} ${per ? 'lengths / time' : 'lengths'}`;
   };
   for (const [name, { words, has }] of Object.entries(COLOURS)) {
     const is_there = has ? has(run) : run.surfaces.some(({ values }) => values[name]);

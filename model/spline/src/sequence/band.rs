@@ -19,6 +19,49 @@ const SUM_OF: [[usize; ACTING]; ACTING] = [[0, 1, 2], [1, 3, 4], [2, 4, 5]];
 /// Entries of a row before the diagonal.
 const WIDTH: usize = 3 * ACTING - 1;
 
+/// Numbers of a symmetric 3 x 3 matrix.
+const NUMBERS: usize = 6;
+
+/// The sums of a node.
+type Packed<R> = [[R; NUMBERS]; PAIRS];
+
+/// The sums of those nodes on which a hop acts.
+struct HopSums<R> {
+    /// The nodes, ascending.
+    nodes: Vec<u32>,
+    sums: Vec<Packed<R>>,
+}
+
+impl<R: Real> HopSums<R> {
+    fn new(blocks: &NodeBlocks<R, PAIRS>, nodes: usize) -> Self {
+        let mut out = Self {
+            nodes: Vec::new(),
+            sums: Vec::new(),
+        };
+        for start in (0..nodes).step_by(BLOCK) {
+            let sums = blocks.sums(start, BLOCK.min(nodes - start));
+            for (k, sums) in sums.into_iter().enumerate() {
+                if sums.as_flattened().iter().any(|x| *x != 0.0) {
+                    out.nodes.push((start + k) as u32);
+                    out.sums.push(sums.map(packed));
+                }
+            }
+        }
+        out
+    }
+
+    /// The sums of a node, if the hop acts on it.
+    fn of(&self, node: usize) -> Option<&Packed<R>> {
+        let found = self.nodes.binary_search(&(node as u32));
+        found.ok().map(|at| &self.sums[at])
+    }
+}
+
+fn packed<R: Real>(sums: [f64; LANES]) -> [R; NUMBERS] {
+    let [a, b, c, d, e, f, ..] = sums;
+    [a, b, c, d, e, f].map(R::of)
+}
+
 /// A row of a factor: the entries before the diagonal, and one over the diagonal.
 type Row<R> = [R; WIDTH + 1];
 
@@ -36,15 +79,22 @@ const NONE: u32 = u32::MAX;
 impl<R: Real> BandPreconditioner<R> {
     pub(super) fn new(hops: &[HopTerms<R, 2>], ridge: f64, nodes: usize) -> Self {
         let size = 3 * (hops.len() + ACTING - 1);
-        let blocks: Vec<NodeBlocks<R, PAIRS>> = hops.par_iter().map(HopTerms::blocks).collect();
+        // Those of one hop take several times what is left of them.
+        let sums: Vec<HopSums<R>> = hops
+            .par_iter()
+            .map(|hop| HopSums::new(&hop.blocks(), nodes))
+            .collect();
         let found: Vec<Vec<Option<Vec<Row<R>>>>> = (0..nodes.div_ceil(BLOCK))
             .into_par_iter()
             .map(|block| {
                 let start = block * BLOCK;
-                let count = BLOCK.min(nodes - start);
-                let sums: Vec<_> = blocks.iter().map(|of| of.sums(start, count)).collect();
-                let at = |node: usize| factor(sums.iter().map(|sums| &sums[node]), size, ridge);
-                (0..count).map(at).collect()
+                let end = nodes.min(start + BLOCK);
+                let at = |node: usize| {
+                    let hops = sums.iter().enumerate();
+                    let acting = hops.filter_map(|(s, sums)| Some((s, sums.of(node)?)));
+                    factor(acting, size, ridge)
+                };
+                (start..end).map(at).collect()
             })
             .collect();
         let (mut slots, mut rows) = (Vec::with_capacity(nodes), Vec::new());
@@ -98,16 +148,16 @@ impl<R: Real> BandPreconditioner<R> {
 
 /// The Cholesky factor of a node's block; none where nothing acts on the node.
 fn factor<'a, R: Real>(
-    hops: impl Iterator<Item = &'a [[f64; LANES]; PAIRS]>,
+    hops: impl Iterator<Item = (usize, &'a Packed<R>)>,
     size: usize,
     ridge: f64,
 ) -> Option<Vec<Row<R>>> {
     let mut band = vec![[0.0; WIDTH + 1]; size];
     let mut trace = 0.0;
-    for (s, sums) in hops.enumerate() {
+    for (s, sums) in hops {
         for a in 0..3 * ACTING {
             for b in 0..=a {
-                let value = sums[SUM_OF[a / 3][b / 3]][LANE_OF[a % 3][b % 3]];
+                let value = sums[SUM_OF[a / 3][b / 3]][LANE_OF[a % 3][b % 3]].wide();
                 band[3 * s + a][WIDTH - (a - b)] += value;
                 if a == b {
                     trace += value;
@@ -180,7 +230,8 @@ mod tests {
             }
         }
         let ridge = 0.1;
-        let rows = factor::<f64>(sums.iter(), 12, ridge).expect("something acts");
+        let sums: Vec<Packed<f64>> = sums.iter().map(|sums| sums.map(packed)).collect();
+        let rows = factor::<f64>(sums.iter().enumerate(), 12, ridge).expect("something acts");
         let preconditioner = BandPreconditioner {
             slots: vec![0],
             rows,

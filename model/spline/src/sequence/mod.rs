@@ -39,7 +39,7 @@ use crate::error::SplineError;
 use crate::grid::Grid;
 use crate::hop::{Hop, Pass};
 use crate::options::{Options, Weights};
-use crate::problem::{Cloud, Pairs, Problem};
+use crate::problem::{Cloud, Pairs, extent};
 use crate::real::Real;
 use crate::solver::{StepReport, Terms};
 use crate::targets::Surface;
@@ -104,6 +104,11 @@ impl SequenceProblem {
     }
 }
 
+/// What belongs to key frame `s` and to the next.
+fn two<T>(all: &[Arc<T>], s: usize) -> [Arc<T>; 2] {
+    [Arc::clone(&all[s]), Arc::clone(&all[s + 1])]
+}
+
 /// The lengths of the intervals, of which the mean is 1.
 fn lengths(times: &[f64]) -> Vec<f64> {
     let mean = (times[times.len() - 1] - times[0]) / (times.len() - 1) as f64;
@@ -139,26 +144,17 @@ impl<R: Real> SequenceSolver<R> {
             times,
             pairs,
         } = problem;
+        shapes
+            .iter()
+            .try_for_each(|shape| shape.check("key frame"))?;
+        pairs.iter().try_for_each(Pairs::check)?;
+        let shapes: Vec<Arc<Cloud>> = shapes.into_iter().map(Arc::new).collect();
         let surfaces: Vec<Arc<Surface>> = shapes
             .par_iter()
             .map(|shape| Arc::new(Surface::new(shape)))
             .collect();
         let lengths = lengths(&times);
-        let problems: Vec<Problem> = shapes
-            .windows(2)
-            .zip(pairs)
-            .map(|(two, pairs)| Problem {
-                shapes: [two[0].clone(), two[1].clone()],
-                pairs,
-            })
-            .collect();
-        let (mut lower, mut upper) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        for problem in &problems {
-            problem.check()?;
-            let [from, to] = problem.extent();
-            lower = [0, 1, 2].map(|i: usize| lower[i].min(from[i]));
-            upper = [0, 1, 2].map(|i: usize| upper[i].max(to[i]));
-        }
+        let [lower, upper] = extent(shapes.iter().map(Arc::as_ref), pairs.iter());
         let grid = Grid::around(lower, upper, options.spacing, options.margin)?;
         let mut finest = grid;
         for _ in 1..options.steps.len() {
@@ -172,19 +168,21 @@ impl<R: Real> SequenceSolver<R> {
                 Arc::new(by_cell(points, &finest))
             })
             .collect();
-        let shared = clouds.windows(2).zip(surfaces.windows(2));
-        let hops = problems.into_iter().zip(shared).zip(&lengths).map(
-            |((problem, (clouds, surfaces)), length)| Hop {
-                problem,
-                clouds: [Arc::clone(&clouds[0]), Arc::clone(&clouds[1])],
-                surfaces: [Arc::clone(&surfaces[0]), Arc::clone(&surfaces[1])],
+        let hops = pairs
+            .into_iter()
+            .zip(&lengths)
+            .enumerate()
+            .map(|(s, (pairs, length))| Hop {
+                shapes: two(&shapes, s),
+                pairs,
+                clouds: two(&clouds, s),
+                surfaces: two(&surfaces, s),
                 weights: Weights {
                     strain: weights.strain / length,
                     screw: weights.screw / length.powi(3),
                     ..weights
                 },
-            },
-        );
+            });
         Ok(Self {
             hops: hops.collect(),
             field: SequenceField::zero(grid, times),

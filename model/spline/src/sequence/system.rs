@@ -10,32 +10,35 @@ use crate::sequence::band::BandPreconditioner;
 use crate::sequence::field::{ACTING, SequenceField, place, take};
 use crate::system::HopTerms;
 
-/// The terms of a hop, and the part of a vector and of its product that the hop sees.
-struct OfHop<R: Real> {
-    terms: HopTerms<R, 2>,
+/// Hops that are worked on together: what they see of a vector, and give, is held for so many at a time.
+const TOGETHER: usize = 16;
+
+/// What a hop sees of a vector, and what it gives.
+struct Seen<R> {
     from: Vec<Node<R, 2>>,
     product: Vec<Node<R, 2>>,
 }
 
 /// The terms of all hops, a ridge and the preconditioner.
 pub(super) struct SequenceSystem<R: Real> {
-    hops: Vec<OfHop<R>>,
+    hops: Vec<HopTerms<R, 2>>,
+    seen: Vec<Seen<R>>,
     preconditioner: BandPreconditioner<R>,
     ridge: R,
     entries: usize,
 }
 
 impl<R: Real> SequenceSystem<R> {
-    pub(super) fn new(field: &SequenceField<R>, terms: Vec<HopTerms<R, 2>>, ridge: f64) -> Self {
+    pub(super) fn new(field: &SequenceField<R>, hops: Vec<HopTerms<R, 2>>, ridge: f64) -> Self {
         let nodes = field.grid().size();
-        let of_hop = |terms| OfHop {
-            terms,
+        let seen = |_| Seen {
             from: vec![Node::ZERO; nodes],
             product: vec![Node::ZERO; nodes],
         };
         Self {
-            preconditioner: BandPreconditioner::new(&terms, ridge, nodes),
-            hops: terms.into_iter().map(of_hop).collect(),
+            preconditioner: BandPreconditioner::new(&hops, ridge, nodes),
+            seen: (0..TOGETHER.min(hops.len())).map(seen).collect(),
+            hops,
             ridge: R::of(ridge),
             entries: field.entries(),
         }
@@ -44,7 +47,7 @@ impl<R: Real> SequenceSystem<R> {
     /// Points of the band of all hops.
     pub(super) fn places_of_band(&self) -> usize {
         let each = self.hops.iter();
-        each.map(|hop| hop.terms.priors.places.len()).sum()
+        each.map(|hop| hop.priors.places.len()).sum()
     }
 
     /// The weight of half the squares of the coefficients.
@@ -55,41 +58,62 @@ impl<R: Real> SequenceSystem<R> {
 
     /// The gradient of the objective by the coefficients.
     pub(super) fn gradient(&mut self, field: &SequenceField<R>) -> Vec<Node<R>> {
-        self.hops.par_iter_mut().for_each(|hop| {
-            hop.terms.gradient(&hop.from, R::ZERO, &mut hop.product);
-        });
         let mut out = vec![Node::ZERO; field.nodes.len()];
-        self.add_up(&field.nodes, &mut out);
+        self.sum(&field.nodes, &mut out, &|hop, seen| {
+            hop.gradient(&seen.from, R::ZERO, &mut seen.product);
+        });
         out
     }
 
-    /// `out = ridge base + sum of what the hops hold`; gives `base . out`.
-    fn add_up(&self, base: &[Node<R>], out: &mut [Node<R>]) -> f64 {
-        let (entries, block) = (self.entries, self.block());
-        let nodes = block / entries;
-        let dots: Vec<f64> = out
-            .par_chunks_mut(block)
-            .zip(base.par_chunks(block))
-            .enumerate()
-            .map(|(number, (out, base))| {
-                for (out, base) in out.iter_mut().zip(base) {
-                    *out = base.scaled(self.ridge);
-                }
-                for (s, hop) in self.hops.iter().enumerate() {
-                    let from = &hop.product[number * nodes..];
-                    for (out, from) in out.chunks_exact_mut(entries).zip(from) {
-                        for j in 0..ACTING {
-                            let (entry, lane) = place(s + j);
-                            for i in 0..3 {
-                                out[entry].0[0][lane + i] += from.0[j / 2][4 * (j % 2) + i];
-                            }
-                        }
+    /// `out = ridge base + sum of what the hops give`, each given what it sees of `base`; gives `base . out`.
+    fn sum(
+        &mut self,
+        base: &[Node<R>],
+        out: &mut [Node<R>],
+        give: &(impl Fn(&mut HopTerms<R, 2>, &mut Seen<R>) + Sync),
+    ) -> f64 {
+        let (entries, block, ridge) = (self.entries, self.block(), self.ridge);
+        for (out, base) in out.iter_mut().zip(base) {
+            *out = base.scaled(ridge);
+        }
+        for (batch, hops) in self.hops.chunks_mut(TOGETHER).enumerate() {
+            let first = batch * TOGETHER;
+            let seen = &mut self.seen[..hops.len()];
+            hops.par_iter_mut()
+                .zip(seen.par_iter_mut())
+                .enumerate()
+                .for_each(|(k, (hop, seen))| {
+                    take(base, entries, first + k, &mut seen.from);
+                    give(hop, seen);
+                });
+            let nodes = block / entries;
+            out.par_chunks_mut(block)
+                .enumerate()
+                .for_each(|(number, out)| {
+                    for (k, seen) in seen.iter().enumerate() {
+                        let from = &seen.product[number * nodes..];
+                        add(from, entries, first + k, out);
                     }
-                }
-                dot(base, out)
-            })
+                });
+        }
+        let dots: Vec<f64> = out
+            .par_chunks(block)
+            .zip(base.par_chunks(block))
+            .map(|(out, base)| dot(base, out))
             .collect();
         dots.iter().sum()
+    }
+}
+
+/// Adds what hop `s` gives.
+fn add<R: Real>(from: &[Node<R, 2>], entries: usize, s: usize, out: &mut [Node<R>]) {
+    for (out, from) in out.chunks_exact_mut(entries).zip(from) {
+        for j in 0..ACTING {
+            let (entry, lane) = place(s + j);
+            for i in 0..3 {
+                out[entry].0[0][lane + i] += from.0[j / 2][4 * (j % 2) + i];
+            }
+        }
     }
 }
 
@@ -99,12 +123,9 @@ impl<R: Real> Linear<R> for SequenceSystem<R> {
     }
 
     fn product(&mut self, p: &[Node<R>], q: &mut [Node<R>]) -> f64 {
-        let entries = self.entries;
-        self.hops.par_iter_mut().enumerate().for_each(|(s, hop)| {
-            take(p, entries, s, &mut hop.from);
-            hop.terms.product(&hop.from, R::ZERO, &mut hop.product);
-        });
-        self.add_up(p, q)
+        self.sum(p, q, &|hop, seen| {
+            hop.product(&seen.from, R::ZERO, &mut seen.product);
+        })
     }
 
     #[inline(always)]

@@ -160,3 +160,63 @@ fn each_mistake_says_where_it_is_and_what_to_do() {
         assert_eq!(message(&text), told);
     }
 }
+
+#[test]
+fn a_folder_or_a_pattern_is_a_sequence_in_the_order_of_its_numbers() {
+    let place = tempfile::tempdir().expect("a temporary folder");
+    for name in [
+        "scan10.ply",
+        "scan2.ply",
+        "scan1.ply",
+        ".scan3.ply",
+        "notes.txt",
+    ] {
+        std::fs::write(place.path().join(name), "").expect("written");
+    }
+    let of = |sequence: &str, rest: &str| {
+        let path = place.path().join(sequence);
+        let text = format!("[data]\nsequence = {path:?}\n{rest}");
+        read(&text)
+    };
+    let names = |recipe: &Recipe| -> Vec<(String, f64)> {
+        let keys = recipe.data.keyframes.iter();
+        let name = |key: &KeyframeRecipe| {
+            key.file
+                .file_name()
+                .map(|name| name.to_string_lossy().into_owned())
+        };
+        keys.map(|key| (name(key).expect("a name"), key.time))
+            .collect()
+    };
+    let all = [("scan1.ply", 0.0), ("scan2.ply", 1.0), ("scan10.ply", 2.0)];
+    let all = all.map(|(name, time)| (name.to_owned(), time));
+    for sequence in ["", "*.ply"] {
+        let recipe = of(sequence, "").expect("three files");
+        assert_eq!(names(&recipe)[..], all, "{sequence:?}");
+        assert_eq!(read(&recipe.to_toml()).expect("its own print"), recipe);
+    }
+    let some = of("*.ply", "keys = [0, 2]\ncorrespondences = \"match\"\n").expect("two files");
+    assert_eq!(names(&some), [all[0].clone(), all[2].clone()]);
+    assert_eq!(some.data.between, [Correspondences::Match]);
+    for (sequence, rest, told) in [
+        (
+            "*.ply",
+            "keys = [0, 3]\n",
+            "there is no frame 3: 3 files, counted from 0",
+        ),
+        (
+            "*.obj",
+            "",
+            "there are 0 shapes in this place; give two or more",
+        ),
+        ("[.ply", "", "Pattern syntax error"),
+        (
+            "*.ply",
+            "correspondences = \"/pairs.csv\"\n",
+            "where a sequence is given",
+        ),
+    ] {
+        let refused = of(sequence, rest).expect_err(told).to_string();
+        assert!(refused.contains(told), "{refused}");
+    }
+}

@@ -3,8 +3,8 @@
 use super::*;
 
 fn commented(preset: Preset, all: bool) -> String {
-    let (source, target) = (Path::new("/s.ply"), Path::new("/t.ply"));
-    let text = Recipe::commented(source, target, &Correspondences::None, preset, all);
+    let shapes = ["/s.ply".into(), "/t.ply".into()];
+    let text = Recipe::commented(&shapes, &Correspondences::None, preset, all);
     text.expect("Unicode paths")
 }
 
@@ -96,8 +96,7 @@ fn every_key_stands_once_and_only_all_has_those_of_other_methods() {
 #[test]
 fn it_says_what_the_other_presets_have() {
     let text = Recipe::commented(
-        Path::new("a b.ply"),
-        Path::new("t.ply"),
+        &["a b.ply".into(), "t.ply".into()],
         &Correspondences::File("pairs".into()),
         Preset::Quick,
         false,
@@ -113,4 +112,22 @@ fn it_says_what_the_other_presets_have() {
         "{text}"
     );
     assert!(parsed(&text, &[]).is_ok());
+}
+
+#[test]
+fn many_shapes_are_key_frames_with_the_values_of_many() {
+    let shapes = ["/a.ply", "/b.ply", "/c.ply"].map(Into::into);
+    let text = Recipe::commented(
+        &shapes,
+        &Correspondences::SameVertices,
+        Preset::Instant,
+        false,
+    );
+    let text = text.expect("Unicode paths");
+    let recipe = parsed(&text, &[]).expect("a recipe");
+    let times: Vec<f64> = recipe.data.keyframes.iter().map(|key| key.time).collect();
+    assert_eq!(times, [0.0, 1.0, 2.0]);
+    assert_eq!(recipe.data.between, vec![Correspondences::SameVertices; 2]);
+    assert!(text.contains("\n#loss.screw = 10\n"), "{text}");
+    assert_eq!(parsed(&live(&text), &[]).expect("each key live"), recipe);
 }

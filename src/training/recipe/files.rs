@@ -1,0 +1,86 @@
+//! The files that a folder or a pattern stands for, in the order in which people count.
+
+use std::cmp::Ordering;
+use std::path::{Path, PathBuf};
+
+/// Endings of the files of a folder that are shapes for certain; a pattern may name others.
+const SHAPES: [&str; 10] = [
+    "ply", "obj", "stl", "off", "glb", "gltf", "npy", "npz", "xyz", "pts",
+];
+
+/// Whether a path stands for many files: a folder, or a pattern with `*`, `?` or `[`.
+pub(super) fn stands_for_many(path: &Path) -> bool {
+    path.is_dir() || (!path.exists() && path.to_string_lossy().contains(['*', '?', '[']))
+}
+
+/// The files that a folder or a pattern stands for.
+///
+/// # Errors
+/// What the file system says, or what is wrong with the pattern.
+pub(super) fn listed(path: &Path) -> Result<Vec<PathBuf>, String> {
+    let mut files: Vec<PathBuf> = Vec::new();
+    if path.is_dir() {
+        for entry in std::fs::read_dir(path).map_err(|error| error.to_string())? {
+            let file = entry.map_err(|error| error.to_string())?.path();
+            let extension = file.extension().unwrap_or_default();
+            let known = SHAPES
+                .iter()
+                .any(|known| extension.eq_ignore_ascii_case(known));
+            // A hidden file is no frame: some systems leave one beside each file.
+            let hidden = name(&file).starts_with('.');
+            if known && !hidden && file.is_file() {
+                files.push(file);
+            }
+        }
+    } else {
+        let pattern = path.to_string_lossy();
+        let visible = glob::MatchOptions {
+            require_literal_leading_dot: true,
+            ..glob::MatchOptions::default()
+        };
+        let found = glob::glob_with(&pattern, visible).map_err(|error| error.to_string())?;
+        for file in found {
+            let file = file.map_err(|error| error.to_string())?;
+            if file.is_file() {
+                files.push(file);
+            }
+        }
+    }
+    files.sort_by(|a, b| natural_order(&name(a), &name(b)).then_with(|| a.cmp(b)));
+    Ok(files)
+}
+
+fn name(file: &Path) -> String {
+    let name = file.file_name().unwrap_or_default();
+    name.to_string_lossy().into_owned()
+}
+
+/// Names in the order in which people count: runs of digits compare as numbers.
+pub fn natural_order(a: &str, b: &str) -> Ordering {
+    let (mut left, mut right) = (a, b);
+    while let (Some(x), Some(y)) = (left.chars().next(), right.chars().next()) {
+        let order = if x.is_ascii_digit() && y.is_ascii_digit() {
+            let (one, other) = (take_digits(&mut left), take_digits(&mut right));
+            // Without leading zeros the longer number is the greater, whatever its size.
+            one.len().cmp(&other.len()).then(one.cmp(other))
+        } else {
+            (left, right) = (&left[x.len_utf8()..], &right[y.len_utf8()..]);
+            x.cmp(&y)
+        };
+        if order != Ordering::Equal {
+            return order;
+        }
+    }
+    // One is the beginning of the other, or they differ in leading zeros only.
+    left.len().cmp(&right.len()).then(a.cmp(b))
+}
+
+/// Takes the digits that the text begins with, and gives them without leading zeros.
+fn take_digits<'a>(text: &mut &'a str) -> &'a str {
+    let end = text
+        .find(|c: char| !c.is_ascii_digit())
+        .unwrap_or(text.len());
+    let (digits, rest) = text.split_at(end);
+    *text = rest;
+    digits.trim_start_matches('0')
+}

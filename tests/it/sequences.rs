@@ -1,0 +1,302 @@
+//! Motions through more than two shapes: from files to surfaces, in the user's own time.
+
+use std::fs;
+
+use crate::support::mesh::Mesh;
+use crate::support::ply;
+use crate::support::run::{frames, json};
+use crate::support::sequence::Sequence;
+use crate::support::workplace::{Workplace, names, turn};
+
+/// Small surfaces and a solver with few samples.
+const SMALL: [&str; 8] = [
+    "--set",
+    "result.resolution=32",
+    "--set",
+    "spline.band=1000",
+    "--set",
+    "data.points=2000",
+    "--set",
+    "spline.spacing=0.15",
+];
+
+/// A sphere that falls faster and faster, at these times; `scan-TIME.ply`.
+fn falling(times: &[u32]) -> Workplace {
+    let place = Workplace::new();
+    for time in times {
+        let way = 0.05 * f64::from(time * time);
+        let sphere = Mesh::sphere(1.0, 3).map(|x| [x[0], x[1], x[2] - way]);
+        place.write(&format!("scan-{time}.ply"), ply::text(&sphere));
+    }
+    place
+}
+
+fn mean_z(mesh: &Mesh) -> f64 {
+    mesh.vertices.iter().map(|x| x[2]).sum::<f64>() / mesh.vertices.len() as f64
+}
+
+#[test]
+fn files_of_a_folder_become_one_smooth_motion_in_their_own_time() {
+    let _turn = turn();
+    let place = falling(&[0, 1, 2, 10]);
+    // Out of the order of letters, and one of them left out.
+    place.write(
+        "recipe.toml",
+        "preset = \"instant\"\n[data]\nsequence = \"scan-*.ply\"\nkeys = [0, 1, 2]\n\
+         correspondences = \"same-vertices\"\n",
+    );
+    let trained = place
+        .isomorph(&[&["train", "recipe.toml", "--run", "run"], &SMALL[..]].concat())
+        .succeeded();
+    assert!(
+        trained.stderr.contains("key frames of"),
+        "{}",
+        trained.stderr
+    );
+    let run = place.run("run");
+    let listed = json(&run.path("meshes/frames.json"));
+    let listed = listed.as_array().expect("a list");
+    let keys: Vec<(f64, u64)> = (listed.iter())
+        .filter_map(|frame| Some((frame["time"].as_f64()?, frame["key"].as_u64()?)))
+        .collect();
+    assert_eq!(
+        keys,
+        [(0.0, 0), (1.0, 1), (2.0, 2)],
+        "each key frame has its surface"
+    );
+    // The truth half-way is -.05 * 1.5^2 = -.1125; straight lines would be at -.125.
+    let times = ["--times", "1.5", "--carry", "-o", "half", "--quiet"];
+    place
+        .isomorph(&[&["extract", "run"], &times[..]].concat())
+        .succeeded();
+    let half = &frames(&place.path("half"))[0];
+    assert_eq!(half.time, 1.5);
+    for file in ["half/surface-000.ply", "half/carried-000.ply"] {
+        let found = mean_z(&ply::Ply::read(&place.path(file)).mesh());
+        assert!((found + 0.1125).abs() < 6e-3, "{file}: {found}");
+    }
+    // From the last key frame back to the first.
+    let back = [
+        "--times",
+        "0,2",
+        "--carry",
+        "--carry-from",
+        "2",
+        "-o",
+        "back",
+        "--quiet",
+    ];
+    place
+        .isomorph(&[&["extract", "run"], &back[..]].concat())
+        .succeeded();
+    let at = |file: &str| mean_z(&ply::Ply::read(&place.path(file)).mesh());
+    assert!(at("back/carried-000.ply").abs() < 6e-3);
+    assert!(
+        (at("back/carried-001.ply") + 0.2).abs() < 1e-5,
+        "its own vertices"
+    );
+    // Points go from the first key frame to the last.
+    let warp = ["warp", "run", "--points", "scan-0.ply", "-o", "moved.ply"];
+    place.isomorph(&warp).succeeded();
+    assert!((at("moved.ply") + 0.2).abs() < 6e-3, "{}", at("moved.ply"));
+    let beyond = ["extract", "run", "--times", "3"];
+    place
+        .isomorph(&beyond)
+        .refused(2, &["time 3", "must be 0 to 2"]);
+    let page = fs::read_to_string(run.path("report.html")).expect("a page");
+    assert!(page.contains("\"clock\":[0.0,2.0]") && page.contains("through 3 key frames"));
+}
+
+#[test]
+fn morph_takes_any_number_of_files_and_their_times() {
+    let _turn = turn();
+    let place = falling(&[0, 1, 3]);
+    let morph = ["morph", "scan-0.ply", "scan-1.ply", "scan-3.ply"];
+    let more = ["--times", "0,1,3", "--frames", "4"];
+    let ended = place
+        .isomorph(&[&morph[..], &more, &SMALL].concat())
+        .succeeded();
+    for said in [
+        "since all files have the same faces",
+        "times: 0, 1, 3; the motion is smooth through all files",
+    ] {
+        assert!(ended.stderr.contains(said), "{said}: {}", ended.stderr);
+    }
+    let run = place.run("runs/scan-0-scan-3");
+    assert_eq!(
+        names(&run.path("meshes")),
+        ["carried.glb", "frames.json", "preview.png", "surface.glb"]
+    );
+    let two = ["--times", "0,1", "-o", "other"];
+    place
+        .isomorph(&[&morph[..], &two].concat())
+        .refused(2, &["2 times for 3 files"]);
+    let preset = ["--preset", "quick", "-o", "other"];
+    place.isomorph(&[&morph[..], &preset].concat()).refused(
+        2,
+        &["networks are trained on two key frames, not 3", "instant"],
+    );
+}
+
+#[test]
+fn an_animation_has_the_pace_that_is_asked_for() {
+    let _turn = turn();
+    let place = falling(&[0, 1, 2]);
+    let morph = ["morph", "scan-0.ply", "scan-1.ply", "scan-2.ply", "--quiet"];
+    place.isomorph(&[&morph[..], &SMALL].concat()).succeeded();
+    let extract = [
+        "extract",
+        "runs/scan-0-scan-2",
+        "--quiet",
+        "--resolution",
+        "24",
+    ];
+    let eased = [
+        "--ease",
+        "smooth",
+        "--fps",
+        "2",
+        "--seconds",
+        "2",
+        "-o",
+        "smooth",
+    ];
+    place.isomorph(&[&extract[..], &eased].concat()).succeeded();
+    let times: Vec<f64> = (frames(&place.path("smooth")).iter())
+        .map(|frame| frame.time)
+        .collect();
+    assert_eq!(times, [0.0, 0.3125, 1.0, 1.6875, 2.0]);
+    place.write("ease.csv", "0,0\n1,2\n3,2\n");
+    let held = [
+        "--ease", "ease.csv", "--frames", "4", "--format", "glb", "-o", "held",
+    ];
+    place.isomorph(&[&extract[..], &held].concat()).succeeded();
+    let times: Vec<f64> = (frames(&place.path("held")).iter())
+        .map(|frame| frame.time)
+        .collect();
+    assert_eq!(times, [0.0, 2.0, 2.0, 2.0]);
+    place.write("wrong.csv", "0,0\n1,2\n3,1\n");
+    let wrong = ["--ease", "wrong.csv"];
+    place
+        .isomorph(&[&extract[..], &wrong].concat())
+        .refused(2, &["wrong.csv:3", "goes back"]);
+}
+
+#[test]
+fn a_sequence_is_measured_against_all_frames_between_its_key_frames() {
+    let _turn = turn();
+    let place = Workplace::new();
+    // The whole way grows with the square of the frame.
+    let sphere = Mesh::sphere(1.0, 3);
+    let fallen = |k: i32| {
+        let way = 0.03 * f64::from(k * k);
+        sphere.clone().map(|x| [x[0], x[1], x[2] - way])
+    };
+    let falling = Sequence((0..9).map(fallen).collect());
+    place.write("fall.anime", falling.anime());
+    let of = |keys: &str| {
+        format!(
+            "preset = \"instant\"\n[data]\nsequence = \"fall.anime\"\nkeys = {keys}\n\
+             correspondences = \"same-vertices\"\n"
+        )
+    };
+    let measured = |keys: &str, run: &str| {
+        place.write("recipe.toml", of(&format!("[{keys}]")));
+        let train = [
+            "train",
+            "recipe.toml",
+            "--quiet",
+            "--run",
+            run,
+            "--set",
+            "result.frames=0",
+        ];
+        place.isomorph(&[&train[..], &SMALL].concat()).succeeded();
+        let evaluate = [
+            "evaluate",
+            run,
+            "--ground-truth",
+            "fall.anime",
+            "--keys",
+            keys,
+        ];
+        let few = ["--samples", "2000", "--quiet"];
+        let table = place.isomorph(&[&evaluate[..], &few].concat()).succeeded();
+        assert!(
+            table.stdout.contains("drift of vertices"),
+            "{}",
+            table.stdout
+        );
+        json(&place.run(run).path("evaluation.json"))
+    };
+    let many = measured("0,3,6,8", "many");
+    let rmse = |kind: &str| {
+        many["mean"][kind]["tracked_rmse"]
+            .as_f64()
+            .expect("a number")
+    };
+    // Straight lines cannot see that the speed grows.
+    assert!(
+        rmse("carried") < 0.5 * rmse("linear"),
+        "{} {}",
+        rmse("carried"),
+        rmse("linear")
+    );
+    assert!(rmse("natural") < 0.5 * rmse("linear"));
+    assert_eq!(many["segments"].as_array().map(Vec::len), Some(3));
+    let drift = many["drift"]["mean"].as_f64().expect("a number");
+    assert!(drift < rmse("linear"), "{drift}");
+    let keys = ["evaluate", "many", "--ground-truth", "fall.anime", "--keys"];
+    place
+        .isomorph(&[&keys[..], &["0,3,8"]].concat())
+        .refused(2, &["3 frames for the 4 key frames"]);
+    place
+        .isomorph(&[&keys[..], &["0,2,6,8"]].concat())
+        .refused(1, &["frame 2"]);
+    let pair = [
+        "evaluate",
+        "many",
+        "--ground-truth",
+        "fall.anime",
+        "--from",
+        "0",
+        "--to",
+        "8",
+    ];
+    place.isomorph(&pair).refused(2, &["--keys"]);
+}
+
+#[test]
+fn a_sequence_that_was_stopped_ends_in_the_same_field() {
+    let _turn = turn();
+    let place = falling(&[0, 1, 2]);
+    place.write(
+        "recipe.toml",
+        "preset = \"instant\"\n[data]\nsequence = \"scan-*.ply\"\ncorrespondences = \"match\"\n\
+         [checkpoint]\nevery = 2\nkeep = 9\n",
+    );
+    let train = [
+        "train",
+        "recipe.toml",
+        "--run",
+        "whole",
+        "--set",
+        "result.frames=0",
+    ];
+    place.isomorph(&[&train[..], &SMALL].concat()).succeeded();
+    let whole = place.run("whole");
+    // Pairs were found for each interval, and are kept with the run.
+    for file in ["pairs-0000.csv", "pairs-0001.csv"] {
+        assert!(whole.path(file).is_file(), "{file}");
+    }
+    let cut = place.run("cut");
+    whole.cut_at(4, &cut);
+    for file in ["pairs-0000.csv", "pairs-0001.csv"] {
+        fs::copy(whole.path(file), cut.path(file)).expect("copied");
+    }
+    place.isomorph(&["resume", "cut", "--quiet"]).succeeded();
+    assert!(
+        cut.networks() == whole.networks(),
+        "the same field, bit for bit"
+    );
+}
