@@ -109,13 +109,33 @@ fn started(event: &Event) -> Option<String> {
         .iter()
         .map(|(name, weights)| format!("{name} has {}", counted(*weights, "weight")))
         .collect();
-    let points: Vec<String> = points.iter().map(|count| grouped(*count)).collect();
+    let of_points = match points[..] {
+        [source, target] => {
+            format!("key frames of {} and {}", grouped(source), grouped(target))
+        }
+        _ => key_frames(points),
+    };
     Some(format!(
-        "{begun} {backend} ({device}): {}; key frames of {} points, {}",
+        "{begun} {backend} ({device}): {}; {of_points} points, {}",
         networks.join(", "),
-        points.join(" and "),
         counted(*correspondences, "correspondence"),
     ))
+}
+
+/// How many key frames there are, and of how many points.
+fn key_frames(points: &[usize]) -> String {
+    let least = points.iter().copied().min().unwrap_or(0);
+    let most = points.iter().copied().max().unwrap_or(0);
+    let count = points.len();
+    if least == most {
+        format!("{count} key frames of {}", grouped(most))
+    } else {
+        format!(
+            "{count} key frames of {} to {}",
+            grouped(least),
+            grouped(most)
+        )
+    }
 }
 
 /// What matching has found; `None` for any other event.

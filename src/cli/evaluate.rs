@@ -138,8 +138,8 @@ fn line(name: &str, metrics: &Metrics) -> String {
     )
 }
 
-/// The lines of what was compared with the truth.
-fn lines(mean: &FrameResult) -> String {
+/// The lines of what was compared with the truth, at the best times too where these were sought.
+fn lines(mean: &FrameResult, aligned: bool) -> String {
     let kinds = [
         ("surface", mean.surface.as_ref()),
         ("carried", mean.carried.as_ref()),
@@ -148,14 +148,14 @@ fn lines(mean: &FrameResult) -> String {
     ];
     let both = |(name, compared): (&str, Option<&Compared>)| {
         let compared = compared?;
-        let aligned = line(&format!("{name}, aligned"), &compared.aligned);
-        Some(line(name, &compared.metrics) + &aligned)
+        let best = aligned.then(|| line(&format!("{name}, aligned"), &compared.aligned));
+        Some(line(name, &compared.metrics) + &best.unwrap_or_default())
     };
     kinds.into_iter().filter_map(both).collect::<String>() + &line("floor", &mean.floor)
 }
 
-const LEGEND: &str = "CD x10^3 is the squared Chamfer distance of the paper; CD and HD are not squared; aligned: at the \
-                      best times";
+const LEGEND: &str =
+    "CD x10^3 is the squared Chamfer distance of the paper; CD and HD are not squared";
 
 /// The means, one line per thing measured.
 fn table(evaluation: &Evaluation, [from, to]: [usize; 2]) -> String {
@@ -164,7 +164,7 @@ fn table(evaluation: &Evaluation, [from, to]: [usize; 2]) -> String {
         evaluation.frames.len(),
     );
     table += &header();
-    table += &lines(&evaluation.mean);
+    table += &lines(&evaluation.mean, true);
     for (end, result) in ["source", "target"].into_iter().zip(&evaluation.ends) {
         if let Some(surface) = &result.surface {
             table += &line(&format!("surface, {end}"), &surface.metrics);
@@ -174,7 +174,9 @@ fn table(evaluation: &Evaluation, [from, to]: [usize; 2]) -> String {
     if let Some(carried) = evaluation.ends.last().and_then(|end| end.carried.as_ref()) {
         table += &line("carried to target", &carried.metrics);
     }
-    table + LEGEND + "; source, target: the ends that the run was trained on\n"
+    table
+        + LEGEND
+        + "; aligned: at the best times; source, target: the ends that the run was trained on\n"
 }
 
 /// The means over all frames between key frames, then those of each interval, then the drift.
@@ -186,7 +188,7 @@ fn table_of_keys(evaluation: &KeysEvaluation) -> String {
         "mean over {count} frames between the key frames {keys:?}; lengths in normalised units\n"
     );
     table += &header();
-    table += &lines(&evaluation.mean);
+    table += &lines(&evaluation.mean, false);
     for (segment, two) in segments().zip(keys.windows(2)) {
         let kinds = [
             ("surface", segment.mean.surface.as_ref()),

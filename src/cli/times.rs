@@ -17,7 +17,7 @@ pub(super) fn times_of(trained: &Trained, given: &[String], frames: usize) -> Re
 }
 
 fn number(text: &str) -> Result<f64> {
-    text.trim().parse().map_err(|_| {
+    text.trim().parse().map_err(|_not_a_number| {
         Failure::Usage(format!(
             "--times {text}: must be numbers with commas between them, or {KEYS}"
         ))

@@ -47,7 +47,7 @@ pub struct Compared {
     #[serde(flatten)]
     pub metrics: Metrics,
     /// At the best of 129 evenly spaced times, in the order of the frames: an animation's speed
-    /// profile cannot be known from its ends.
+    /// profile cannot be known from its ends. Between key frames at the frame's own time.
     pub aligned: Metrics,
 }
 

@@ -44,9 +44,7 @@ impl Reference {
             _ => Ok(()),
         };
         let carried = self.carried(candidate)?;
-        let carried_times = carried
-            .as_ref()
-            .map(|path| path.align(&self.true_vertices(), &self.grid));
+        let carried_times = carried.as_ref().map(|path| self.best_times(path));
         let surface_times = self.align_surfaces(candidate, &mut go_on)?;
         let mut measure = |frame: &TrueFrame, surface_time: Option<f64>, carried_time| {
             let truth = self.true_surface(frame, Use::Truth);
@@ -121,6 +119,9 @@ impl Reference {
         candidate: &mut C,
         go_on: &mut impl FnMut(usize) -> Measured<C, ()>,
     ) -> Measured<C, Option<Vec<f64>>> {
+        if !self.options.align {
+            return Ok(Some(self.own_times()));
+        }
         let coarse = |frame: &TrueFrame| {
             let rng = generator(self.options.seed, frame.frame, Use::CoarseTruth);
             let coarse = CoarseSurface::new(&self.mesh(&frame.vertices), rng);
@@ -156,7 +157,7 @@ impl Reference {
             return Ok(None);
         }
         if !costs.iter().all(found) {
-            return Ok(Some(self.frames.iter().map(|frame| frame.time).collect()));
+            return Ok(Some(self.own_times()));
         }
         let chosen = least_in_order(&costs).into_iter();
         Ok(Some(chosen.map(|column| self.grid[column]).collect()))

@@ -18,6 +18,8 @@ const FEWEST_TIMES: usize = 9;
 pub(crate) struct Options {
     /// Area-uniform samples per surface.
     pub samples: usize,
+    /// Whether the best times are sought; without, the frames' own stand for them.
+    pub align: bool,
     /// Evenly spaced times that the aligned ones are chosen from.
     pub alignment_times: usize,
     /// Every n-th frame between the ends is evaluated, counted from the first end.
@@ -31,6 +33,7 @@ impl Default for Options {
     fn default() -> Self {
         Self {
             samples: 100_000,
+            align: true,
             alignment_times: 129,
             every: 1,
             seed: 0,
@@ -132,7 +135,10 @@ impl Reference {
             triangles: truth.triangles().to_vec(),
             frames: Vec::new(),
             ends: [span.from(), span.to()].map(unmeasured),
-            grid: evenly_spaced(options.alignment_times),
+            grid: match options.align {
+                true => evenly_spaced(options.alignment_times),
+                false => Vec::new(),
+            },
         };
         let compared = span
             .between()
@@ -170,7 +176,7 @@ impl Reference {
         let [from, to] = [span.from(), span.to()].map(|frame| frame as f64);
         let times = reference.all_times();
         let path = natural::through(&keys, &vertices, &times, |t| from + t * (to - from));
-        let aligned = path.align(&reference.true_vertices(), &reference.grid);
+        let aligned = reference.best_times(&path);
         for (place, aligned) in aligned.into_iter().enumerate() {
             let frame = &reference.frames[place];
             let measure = || -> Result<Compared, NoArea> {
@@ -195,7 +201,7 @@ impl Reference {
     /// Measures the straight lines and the floor; in error, the frame where there is nothing to
     /// measure.
     fn fill(&mut self, straight: &VertexPath) -> Result<(), usize> {
-        let aligned = straight.align(&self.true_vertices(), &self.grid);
+        let aligned = self.best_times(straight);
         for (place, aligned) in aligned.into_iter().enumerate() {
             let frame = &self.frames[place];
             let (linear, floor) = self.measure_reference(frame, straight, aligned)?;
@@ -222,6 +228,19 @@ impl Reference {
             Ok((linear, compare(&again, &truth, frame.time)))
         };
         measure().map_err(|_no_area| frame.frame)
+    }
+
+    /// The best times of vertices, or the frames' own.
+    pub(super) fn best_times(&self, path: &VertexPath) -> Vec<f64> {
+        match self.options.align {
+            true => path.align(&self.true_vertices(), &self.grid),
+            false => self.own_times(),
+        }
+    }
+
+    /// The time of each frame.
+    pub(super) fn own_times(&self) -> Vec<f64> {
+        self.frames.iter().map(|frame| frame.time).collect()
     }
 
     /// The true vertices of each frame.

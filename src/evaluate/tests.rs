@@ -16,6 +16,7 @@ const FRAMES: usize = 9;
 
 const OPTIONS: Options = Options {
     samples: 5000,
+    align: true,
     alignment_times: 33,
     every: 1,
     seed: 3,

@@ -27,6 +27,9 @@ const SPACINGS: f64 = 1.0;
 /// What arrives so many spacings beyond the border of a shape has no counterpart.
 const FREE: f64 = 3.0;
 
+/// The most shapes that are all kept for this.
+const MOST_SHAPES: usize = 32;
+
 /// Less of a shape is not worth a note.
 const LEAST_SHARE: f64 = 0.02;
 
@@ -55,7 +58,7 @@ pub(super) struct End {
 }
 
 impl End {
-    /// All shapes of a run.
+    /// All shapes of a run; of very many the first and the last.
     pub(super) fn all(keys: &[Keyframe], clock: Clock) -> Vec<Self> {
         let count = keys.len();
         let end = |(k, key): (usize, &Keyframe)| Self {
@@ -66,7 +69,9 @@ impl End {
             mesh: key.mesh.clone(),
             border: key.border.clone(),
         };
-        keys.iter().enumerate().map(end).collect()
+        let is_kept =
+            |(k, _): &(usize, &Keyframe)| count <= MOST_SHAPES || *k == 0 || *k + 1 == count;
+        keys.iter().enumerate().filter(is_kept).map(end).collect()
     }
 
     /// What of this end's surface contradicts it; nothing if no surface is of its time.

@@ -126,9 +126,12 @@ impl Trained {
         let times: Vec<f64> = keyframes.keys.iter().map(|key| key.time).collect();
         let mut segments = Vec::with_capacity(spans.len());
         for (span, two) in spans.iter().zip(times.windows(2)) {
-            let options_here = options.of_reference();
-            let reference =
-                Reference::between_keys(truth, *span, keys, &normalisation, options_here)?;
+            // What lies before and after says when everything is where.
+            let own_times = Options {
+                align: false,
+                ..options.of_reference()
+            };
+            let reference = Reference::between_keys(truth, *span, keys, &normalisation, own_times)?;
             let ruler = Ruler {
                 reference: &reference,
                 normalisation,

@@ -97,6 +97,8 @@ const SOLVER: &str = "the spline solver";
 pub(crate) struct Learner {
     recipe: Recipe,
     data: TrainingData,
+    /// Points of each key frame, and known correspondences between them.
+    given: (Vec<usize>, usize),
     normalisation: Normalisation,
     trainer: Box<dyn Trainer>,
     backend: String,
@@ -144,7 +146,14 @@ impl Learner {
                 }
             }
         }
+        let points = data.keys.iter().map(|key| key.points.len());
+        let given = (points.collect(), data.pair_count());
         let is_solved = method::spline::is_solved(&recipe);
+        if is_solved {
+            // No samples are drawn from them.
+            data.keys.clear();
+            data.between.clear();
+        }
         let trainer: Box<dyn Trainer> = if is_solved {
             let solved = Solved::new(&recipe, keyframes).map_err(LearnerError::Unsolved)?;
             Box::new(solved)
@@ -162,6 +171,7 @@ impl Learner {
             normalisation: keyframes.normalisation,
             backend,
             device,
+            given,
             data,
             step,
             seconds: 0.0,
@@ -393,8 +403,8 @@ impl Learner {
             steps: self.recipe.training.steps,
             first_step: self.step,
             networks: self.trainer.networks(),
-            points: self.data.keys.iter().map(|key| key.points.len()).collect(),
-            correspondences: self.data.pair_count(),
+            points: self.given.0.clone(),
+            correspondences: self.given.1,
         }
     }
 }

@@ -94,11 +94,8 @@ impl AnySolver {
                 if solvers.len() != fields.len() || *times != stored {
                     return None;
                 }
-                let each = solvers.iter_mut().zip(fields);
-                Some(
-                    each.map(|(solver, field)| solver.resume_from(field, step))
-                        .collect(),
-                )
+                let mut each = solvers.iter_mut().zip(fields);
+                Some(each.try_for_each(|(solver, field)| solver.resume_from(field, step)))
             }
             _ => None,
         }

@@ -24,14 +24,17 @@ pub(crate) trait Linear<R: Real>: Sync {
 /// The solution and the iterations that it took; nothing if a number on the way is not finite.
 pub(crate) fn solve<R: Real>(
     system: &mut impl Linear<R>,
-    gradient: &[Node<R>],
+    mut gradient: Vec<Node<R>>,
     most: usize,
     tolerance: f64,
 ) -> Option<(Vec<Node<R>>, usize)> {
-    let zero = || vec![Node::ZERO; gradient.len()];
+    let length = gradient.len();
+    let zero = || vec![Node::ZERO; length];
     let (mut x, mut p, mut q, mut z) = (zero(), zero(), zero(), zero());
-    let minus = |node: &Node<R>| node.scaled(-R::ONE);
-    let mut r: Vec<Node<R>> = gradient.iter().map(minus).collect();
+    for node in &mut gradient {
+        *node = node.scaled(-R::ONE);
+    }
+    let mut r = gradient;
     let mut rz = update(system, R::ZERO, &p, &q, &mut x, &mut r, &mut z);
     let end = tolerance * tolerance * rz;
     p.copy_from_slice(&z);

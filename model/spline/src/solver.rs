@@ -90,11 +90,12 @@ impl<R: Real> Solver<R> {
         for _ in 1..options.steps.len() {
             finest = finest.halved()?;
         }
-        let [first, second] = &problem.shapes;
+        let shapes = problem.shapes.map(Arc::new);
+        let [first, second] = &shapes;
         let (first, second) = rayon::join(|| Surface::new(first), || Surface::new(second));
         let of = |x: f32| R::of(f64::from(x));
         let cloud = |which: usize| {
-            let points = problem.shapes[which].points.iter();
+            let points = shapes[which].points.iter();
             let points = points.map(|point| point.map(of)).collect();
             Arc::new(band::by_cell(points, &finest))
         };
@@ -102,7 +103,7 @@ impl<R: Real> Solver<R> {
             hop: Hop {
                 clouds: [cloud(0), cloud(1)],
                 surfaces: [Arc::new(first), Arc::new(second)],
-                shapes: problem.shapes.map(Arc::new),
+                shapes,
                 pairs: problem.pairs,
                 weights,
             },
@@ -168,7 +169,7 @@ impl<R: Real> Solver<R> {
         let gradient = system.gradient(&field);
         let options = &self.options;
         let (most, tolerance) = (options.iterations, options.tolerance);
-        let solution = conjugate::solve(&mut system, &gradient, most, tolerance);
+        let solution = conjugate::solve(&mut system, gradient, most, tolerance);
         let (change, iterations) = solution.ok_or(SplineError::NotFinite {
             step,
             what: "the system",

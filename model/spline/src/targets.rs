@@ -32,24 +32,26 @@ const BUCKET: usize = 32;
 /// A surface arranged for nearest neighbours.
 pub(crate) struct Surface {
     tree: ImmutableKdTree<f64, u32, 3, BUCKET>,
-    points: Vec<[f64; 3]>,
-    normals: Option<Vec<[f64; 3]>>,
-    border: Vec<bool>,
+    cloud: Arc<Cloud>,
 }
 
 impl Surface {
-    pub(crate) fn new(cloud: &Cloud) -> Self {
-        let wide = |points: &[[f32; 3]]| -> Vec<[f64; 3]> {
-            points.iter().map(|point| point.map(f64::from)).collect()
-        };
-        let points = wide(&cloud.points);
-        let unit = |normals: &Vec<[f32; 3]>| wide(normals).into_iter().map(unit).collect();
+    pub(crate) fn new(cloud: &Arc<Cloud>) -> Self {
+        let points: Vec<[f64; 3]> = cloud.points.iter().map(|x| x.map(f64::from)).collect();
         Self {
             tree: ImmutableKdTree::new_from_slice(&points),
-            normals: cloud.normals.as_ref().map(unit),
-            border: cloud.border.clone(),
-            points,
+            cloud: Arc::clone(cloud),
         }
+    }
+
+    fn point(&self, at: usize) -> [f64; 3] {
+        self.cloud.points[at].map(f64::from)
+    }
+
+    /// The unit normal at a point, if there are normals.
+    fn normal(&self, at: usize) -> Option<[f64; 3]> {
+        let normals = self.cloud.normals.as_ref()?;
+        Some(unit(normals[at].map(f64::from)))
     }
 
     fn nearest(&self, query: [f64; 3]) -> usize {
@@ -245,16 +247,14 @@ impl Found {
     ) -> Self {
         let (own, other) = (&surfaces[from], &surfaces[1 - from]);
         let nearest = other.nearest(end);
-        let normal = other.normals.as_ref().map(|normals| normals[nearest]);
-        let agreement = match (&own.normals, normal) {
-            _ if other.border.get(nearest) == Some(&true) => 0.0,
-            (Some(own), Some(found)) => {
-                dot(carried_normal(gradient, own[at]), found).clamp(0.0, 1.0)
-            }
+        let normal = other.normal(nearest);
+        let agreement = match (own.normal(at), normal) {
+            _ if other.cloud.border.get(nearest) == Some(&true) => 0.0,
+            (Some(own), Some(found)) => dot(carried_normal(gradient, own), found).clamp(0.0, 1.0),
             _ => 1.0,
         };
         Self {
-            residual: difference(end, other.points[nearest]),
+            residual: difference(end, other.point(nearest)),
             normal,
             agreement,
         }

@@ -267,10 +267,10 @@ function results(run) {
   // Pieces are worth a column where there is more than one.
   const used = columns.filter(([name]) => run.quality.some((row) => is_said(row, name) && !(name === 'components' && row[name] === 1)));
   const text = (value) => (value === undefined || value === null ? '–' : Number.isInteger(value) ? value.toLocaleString('en') : significant(value, 2));
-  const cell = (value) => make('td', { textContent: text(value) });
+  const cell = (value, name) => make('td', { textContent: name === 'time' ? String(Number(value.toPrecision(6))) : text(value) });
   if (run.quality.length) {
     const head = make('tr', {}, ...used.map(([, words]) => make('th', { textContent: words, scope: 'col' })));
-    const rows = run.quality.map((row) => make('tr', {}, ...used.map(([name]) => cell(row[name]))));
+    const rows = run.quality.map((row) => make('tr', {}, ...used.map(([name]) => cell(row[name], name))));
     $('quality').append(make('table', {}, make('thead', {}, head), make('tbody', {}, ...rows)));
     $('quality').append(make('p', { className: 'note', textContent: 'Consistency, round trip and distance to truth are means in normalised lengths, in which the shapes have the area 1. Small is good.' }));
   } else $('quality').append(make('p', { className: 'note', textContent: 'The run has no surfaces yet: isomorph extract writes them.' }));

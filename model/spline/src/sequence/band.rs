@@ -97,7 +97,9 @@ impl<R: Real> BandPreconditioner<R> {
                 (start..end).map(at).collect()
             })
             .collect();
-        let (mut slots, mut rows) = (Vec::with_capacity(nodes), Vec::new());
+        drop(sums);
+        let acting = found.iter().flatten().flatten().count();
+        let (mut slots, mut rows) = (Vec::with_capacity(nodes), Vec::with_capacity(acting * size));
         let mut used = 0;
         for of_node in found.into_iter().flatten() {
             match of_node {

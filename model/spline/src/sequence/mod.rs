@@ -303,7 +303,7 @@ impl<R: Real> SequenceSolver<R> {
         let (mut system, terms) = self.linearise(&field, level, step, true)?;
         let gradient = system.gradient(&field);
         let (most, tolerance) = (self.options.iterations, self.options.tolerance);
-        let solution = conjugate::solve(&mut system, &gradient, most, tolerance);
+        let solution = conjugate::solve(&mut system, gradient, most, tolerance);
         let (change, iterations) = solution.ok_or(SplineError::NotFinite {
             step,
             what: "the system",
