@@ -144,7 +144,10 @@ fn every_command_has_help_that_names_its_defaults() {
         ("pick", &["--pairs", "--no-browser", "--page", "--force"]),
         ("clean", &["--output", "[default: 5]", "[default: 0.005]"]),
         ("normals", &["--output", "point out of the shape"]),
-        ("init", &["[default: none]", "[default: default]", "--all"]),
+        (
+            "init",
+            &["[default: none]", "[default: default; instant", "--all"],
+        ),
         ("info", &["recipe", "run"]),
         ("bench", &["--json"]),
     ];

@@ -171,6 +171,11 @@ impl<R: Real, const H: usize> EndTerms<R, H> {
         &self.parts
     }
 
+    /// Gives up the private copies of nodes until they are needed again.
+    pub(crate) fn release(&mut self) {
+        self.parts = Vec::new();
+    }
+
     /// How far each place moves its trajectory's end, if the field moves by `nodes`.
     pub(crate) fn move_ends(&mut self, nodes: &[Node<R, H>], strides: [usize; 2]) {
         let length = run_length::<H>(self.places.len());
@@ -222,6 +227,10 @@ impl<R: Real, const H: usize> EndTerms<R, H> {
     }
 
     fn spread(&mut self, strides: [usize; 2]) {
+        if self.parts.is_empty() {
+            let firsts: Vec<u32> = self.places.iter().map(|place| place.first).collect();
+            self.parts = parts::<_, H>(&firsts, strides, &Node::ZERO);
+        }
         let pulls = &self.pulls;
         each_run::<_, _, H>(&mut self.parts, &self.places, |part, places| {
             run(Spread {

@@ -89,8 +89,23 @@ impl<R: Real, const H: usize> PriorTerms<R, H> {
         &self.parts
     }
 
+    /// Gives up the private copies of nodes until they are needed again.
+    pub(crate) fn release(&mut self) {
+        self.parts = Vec::new();
+    }
+
+    /// The private copies are there.
+    fn ensure_parts(&mut self, strides: [usize; 2]) {
+        if self.parts.is_empty() {
+            let places = self.places.iter();
+            let firsts: Vec<u32> = places.map(|place| place.located.first).collect();
+            self.parts = parts::<_, H>(&firsts, strides, &Node::ZERO);
+        }
+    }
+
     /// The parts of the product with the Gauss-Newton matrix.
     pub(crate) fn spread_product(&mut self, nodes: &[Node<R, H>], strides: [usize; 2]) {
+        self.ensure_parts(strides);
         each_run::<_, _, H>(&mut self.parts, &self.places, |part, places| {
             run(Product {
                 nodes,
@@ -103,6 +118,7 @@ impl<R: Real, const H: usize> PriorTerms<R, H> {
 
     /// The parts of the gradient.
     pub(crate) fn spread_gradient(&mut self, strides: [usize; 2]) {
+        self.ensure_parts(strides);
         each_run::<_, _, H>(&mut self.parts, &self.places, |part, places| {
             run(Gradient {
                 strides,

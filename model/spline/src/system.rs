@@ -25,6 +25,12 @@ impl<R: Real, const H: usize> HopTerms<R, H> {
         }
     }
 
+    /// Gives up the private copies of nodes, which take most of the memory, until the next use.
+    pub(crate) fn release(&mut self) {
+        self.ends.release();
+        self.priors.release();
+    }
+
     /// The diagonal blocks of the matrix, `P` sums for each node.
     pub(crate) fn blocks<const P: usize>(&self) -> NodeBlocks<R, P> {
         NodeBlocks::new(&self.ends, &self.priors, self.strides)

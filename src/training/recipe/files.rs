@@ -8,9 +8,9 @@ const SHAPES: [&str; 10] = [
     "ply", "obj", "stl", "off", "glb", "gltf", "npy", "npz", "xyz", "pts",
 ];
 
-/// Whether a path stands for many files: a folder, or a pattern with `*`, `?` or `[`.
+/// Whether a path stands for many files: a folder, or one whose last part has `*`, `?` or `[`.
 pub(super) fn stands_for_many(path: &Path) -> bool {
-    path.is_dir() || (!path.exists() && path.to_string_lossy().contains(['*', '?', '[']))
+    path.is_dir() || (!path.exists() && name(path).contains(['*', '?', '[']))
 }
 
 /// The files that a folder or a pattern stands for.
@@ -33,7 +33,11 @@ pub(super) fn listed(path: &Path) -> Result<Vec<PathBuf>, String> {
             }
         }
     } else {
-        let pattern = path.to_string_lossy();
+        // Patterns act in the name of the file alone: a whole tree is not searched by accident.
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let folder = glob::Pattern::escape(&folder.to_string_lossy());
+        let pattern = Path::new(&folder).join(name(path));
+        let pattern = pattern.to_string_lossy();
         let visible = glob::MatchOptions {
             require_literal_leading_dot: true,
             ..glob::MatchOptions::default()

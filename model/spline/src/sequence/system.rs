@@ -29,7 +29,8 @@ pub(super) struct SequenceSystem<R: Real> {
 }
 
 impl<R: Real> SequenceSystem<R> {
-    pub(super) fn new(field: &SequenceField<R>, hops: Vec<HopTerms<R, 2>>, ridge: f64) -> Self {
+    pub(super) fn new(field: &SequenceField<R>, mut hops: Vec<HopTerms<R, 2>>, ridge: f64) -> Self {
+        hops.iter_mut().for_each(HopTerms::release);
         let nodes = field.grid().size();
         let seen = |_| Seen {
             from: vec![Node::ZERO; nodes],
@@ -85,6 +86,7 @@ impl<R: Real> SequenceSystem<R> {
                 .for_each(|(k, (hop, seen))| {
                     take(base, entries, first + k, &mut seen.from);
                     give(hop, seen);
+                    hop.release();
                 });
             let nodes = block / entries;
             out.par_chunks_mut(block)

@@ -210,6 +210,7 @@ fn a_folder_or_a_pattern_is_a_sequence_in_the_order_of_its_numbers() {
             "there are 0 shapes in this place; give two or more",
         ),
         ("[.ply", "", "Pattern syntax error"),
+        ("**/*.ply", "", "there are 0 shapes in this place"),
         (
             "*.ply",
             "correspondences = \"/pairs.csv\"\n",
