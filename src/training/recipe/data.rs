@@ -84,12 +84,17 @@ impl DataRecipe {
         self.keyframes.iter().all(|key| key.frame.is_some())
     }
 
+    /// Whether as much is known between any two neighbours.
+    fn knows_the_same(&self) -> bool {
+        self.between.windows(2).all(|two| two[0] == two[1])
+    }
+
     /// The values of the section's keys, in their order.
     pub(super) fn to_values(&self) -> Vec<Option<Value>> {
         let (short, sequence) = (self.is_short(), self.is_sequence());
         let file = |given: bool, path: &Path| given.then(|| path.to_owned());
         let frames = self.keyframes.iter().filter_map(|key| key.frame);
-        let plain = if short || sequence {
+        let plain = if short || sequence || self.knows_the_same() {
             self.between[0].clone()
         } else {
             Correspondences::None
@@ -117,7 +122,9 @@ impl DataRecipe {
         if self.is_short() || self.is_sequence() {
             return Vec::new();
         }
-        let known = self.between.iter().map(Some).chain([None]);
+        // What is the same throughout stands above all of them, and can be changed there.
+        let own = |known| (!self.knows_the_same()).then_some(known);
+        let known = self.between.iter().map(own).chain([None]);
         let frames = self.keyframes.iter().zip(known);
         frames
             .map(|(key, known)| {

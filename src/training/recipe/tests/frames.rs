@@ -221,3 +221,20 @@ fn a_folder_or_a_pattern_is_a_sequence_in_the_order_of_its_numbers() {
         assert!(refused.contains(told), "{refused}");
     }
 }
+
+#[test]
+fn what_is_known_throughout_can_be_changed_for_all_key_frames() {
+    let shapes = [("/a.ply", 0.0), ("/b.ply", 1.0), ("/c.ply", 4.0)];
+    let mut recipe = Recipe::through(&shapes).expect("three files");
+    assert_eq!(recipe.data.between, vec![Correspondences::None; 2]);
+    recipe
+        .with("data.correspondences=same-vertices")
+        .expect("a word");
+    assert_eq!(recipe.data.between, vec![Correspondences::SameVertices; 2]);
+    assert!(
+        recipe
+            .to_toml()
+            .contains("\ncorrespondences = \"same-vertices\"\n")
+    );
+    assert_eq!(read(&recipe.to_toml()).expect("its own print"), recipe);
+}
