@@ -283,7 +283,7 @@ def draw(content: dict) -> bytes:
         for look, label in enumerate((ONE, PAIRS, "natural", "linear")):
             # A break at each key frame, where the error starts again.
             x, y = broken(found["frame"], found[label], content["settings"]["keys"])
-            panel.plot(x, y, label=label, **{**figures.style(look), "markersize": 2})
+            panel.plot(x, y, label=label, **{**figures.style(look), "marker": ""})
         for key in content["settings"]["keys"]:
             panel.axvline(key, ls=":", lw=1, color=figures.GREY)
         panel.set_title(name, fontsize=9)

@@ -17,6 +17,7 @@ import compact_results
 import fake_isomorph
 import gpu
 import instant_scaling
+import keys
 import kills
 import matching
 import peers
@@ -218,6 +219,7 @@ class Kept(unittest.TestCase):
         makers = {
             "as-rigid": as_rigid,
             "instant-scaling": instant_scaling,
+            "keys": keys,
             "kills": kills,
             "matching": matching,
             "peers": peers,
