@@ -88,6 +88,27 @@ impl<R: Real, const H: usize> Node<R, H> {
     }
 }
 
+/// Adds a change to all nodes; its largest number.
+pub(crate) fn add_change<R: Real, const H: usize>(
+    nodes: &mut [Node<R, H>],
+    change: &[Node<R, H>],
+) -> f64 {
+    let mut size = 0.0f64;
+    for (node, change) in nodes.iter_mut().zip(change) {
+        for (value, &change) in node.flat_mut().iter_mut().zip(change.flat()) {
+            *value += change;
+            size = size.max(change.wide().abs());
+        }
+    }
+    size
+}
+
+/// Whether all numbers of all nodes are finite.
+pub(crate) fn are_finite<R: Real, const H: usize>(nodes: &[Node<R, H>]) -> bool {
+    let mut numbers = nodes.iter().flat_map(Node::flat);
+    numbers.all(|c| c.wide().is_finite())
+}
+
 /// V, its rate and its Jacobian at a place.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Jet<R: Real = f32> {

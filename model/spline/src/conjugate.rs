@@ -6,6 +6,8 @@
 use rayon::prelude::*;
 
 use crate::cell::Node;
+use crate::error::SplineError;
+use crate::options::Options;
 use crate::real::{Fuse, Kernel, Real, run};
 use crate::scatter::dot;
 
@@ -21,8 +23,23 @@ pub(crate) trait Linear<R: Real>: Sync {
     fn precondition<F: Fuse>(&self, f: F, start: usize, r: &[Node<R>], out: &mut [Node<R>]);
 }
 
+/// The change of a step and the iterations that it took.
+///
+/// # Errors
+/// If a number on the way is not finite.
+pub(crate) fn step<R: Real>(
+    system: &mut impl Linear<R>,
+    gradient: Vec<Node<R>>,
+    options: &Options,
+    step: usize,
+) -> Result<(Vec<Node<R>>, usize), SplineError> {
+    let solution = solve(system, gradient, options.iterations, options.tolerance);
+    let what = "the system";
+    solution.ok_or(SplineError::NotFinite { step, what })
+}
+
 /// The solution and the iterations that it took; nothing if a number on the way is not finite.
-pub(crate) fn solve<R: Real>(
+fn solve<R: Real>(
     system: &mut impl Linear<R>,
     mut gradient: Vec<Node<R>>,
     most: usize,

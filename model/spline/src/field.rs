@@ -14,6 +14,7 @@ use crate::basis::{TimeBasis, halved};
 use crate::cell::{Jet, LANES, Node, first_three};
 use crate::error::SplineError;
 use crate::grid::Grid;
+use crate::levels::OnGrid;
 use crate::real::{Fuse, Kernel, Real, run};
 use crate::trajectory::{Flow, Matrix, diagonal};
 
@@ -63,21 +64,7 @@ impl<R: Real> SplineField<R> {
     ) -> Result<Self, SplineError> {
         let mut out = Self::zero(grid.checked()?, basis);
         let wanted = out.nodes.len() * basis.functions() * 3;
-        if coefficients.len() != wanted {
-            return Err(SplineError::Lengths {
-                what: "coefficients",
-                found: coefficients.len(),
-                wanted,
-            });
-        }
-        if let Some(index) = coefficients.iter().position(|c| !c.wide().is_finite()) {
-            return Err(SplineError::Input {
-                what: "coefficient",
-                index,
-                found: format!("{:?}", coefficients[index]),
-                also: "",
-            });
-        }
+        check_coefficients(coefficients, wanted)?;
         let each = coefficients.chunks_exact(basis.functions() * 3);
         for (node, values) in out.nodes.iter_mut().zip(each) {
             for (k, values) in values.chunks_exact(3).enumerate() {
@@ -119,12 +106,6 @@ impl<R: Real, const H: usize> SplineField<R, H> {
             }
         }
         out
-    }
-
-    /// Whether all coefficients are finite.
-    pub(crate) fn is_finite(&self) -> bool {
-        let finite = |node: &Node<R, H>| node.flat().iter().all(|c| c.wide().is_finite());
-        self.nodes.iter().all(finite)
     }
 
     pub(crate) fn flow(&self) -> Flow<'_, R, H> {
@@ -273,6 +254,41 @@ impl<R: Real, const H: usize> SplineField<R, H> {
         let mut out = Self::zero(self.grid.halved()?, self.basis);
         refine(&self.grid, &self.nodes, 1, &out.grid, &mut out.nodes);
         Ok(out)
+    }
+}
+
+/// # Errors
+/// If coefficients are not so many, or not finite.
+pub(crate) fn check_coefficients<R: Real>(
+    coefficients: &[R],
+    wanted: usize,
+) -> Result<(), SplineError> {
+    if coefficients.len() != wanted {
+        return Err(SplineError::Lengths {
+            what: "coefficients",
+            found: coefficients.len(),
+            wanted,
+        });
+    }
+    let wrong = coefficients.iter().position(|c| !c.wide().is_finite());
+    match wrong {
+        None => Ok(()),
+        Some(index) => Err(SplineError::Input {
+            what: "coefficient",
+            index,
+            found: format!("{:?}", coefficients[index]),
+            also: "",
+        }),
+    }
+}
+
+impl<R: Real> OnGrid<R> for SplineField<R> {
+    fn grid(&self) -> &Grid<R> {
+        &self.grid
+    }
+
+    fn refined(&self) -> Result<Self, SplineError> {
+        self.refined()
     }
 }
 

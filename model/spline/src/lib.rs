@@ -13,6 +13,7 @@
 //! | `band`, `prior` | terms on the field itself, and the points at which they are taken |
 //! | `scatter`, `system`, `preconditioner`, `conjugate` | the linear system of a step |
 //! | `hop` | two neighbouring shapes, and all terms between them |
+//! | `levels` | the grids of a solver |
 //! | `solver`, `samples` | the steps, and what each takes its terms at |
 //! | `sequence` | the same through many key frames |
 //! | `real` | f32 or f64, and vector instructions chosen at run time |
@@ -35,6 +36,7 @@ mod field_tests;
 mod frozen;
 mod grid;
 mod hop;
+mod levels;
 mod options;
 mod preconditioner;
 mod prior;

@@ -11,11 +11,13 @@
 use std::sync::Arc;
 
 use crate::band;
+use crate::cell::{add_change, are_finite};
 use crate::conjugate;
 use crate::error::SplineError;
 use crate::field::SplineField;
 use crate::grid::Grid;
 use crate::hop::{Hop, Pass};
+use crate::levels::{before_step, grid_of};
 use crate::options::{Options, Weights};
 use crate::problem::Problem;
 use crate::real::Real;
@@ -86,10 +88,7 @@ impl<R: Real> Solver<R> {
         options.check()?;
         let [lower, upper] = problem.extent();
         let grid = Grid::around(lower, upper, options.spacing, options.margin)?;
-        let mut finest = grid;
-        for _ in 1..options.steps.len() {
-            finest = finest.halved()?;
-        }
+        let finest = grid_of(grid, options.steps.len() - 1)?;
         let shapes = problem.shapes.map(Arc::new);
         let [first, second] = &shapes;
         let (first, second) = rayon::join(|| Surface::new(first), || Surface::new(second));
@@ -138,7 +137,8 @@ impl<R: Real> Solver<R> {
     /// # Errors
     /// If the field's grid or functions of time are not this solver's there.
     pub fn resume_from(&mut self, field: SplineField<R>, step: usize) -> Result<(), SplineError> {
-        let wanted = self.grid_of(self.options.level(step.saturating_sub(1)))?;
+        let level = self.options.level(step.saturating_sub(1));
+        let wanted = grid_of(self.grid, level)?;
         if *field.grid() != wanted || field.time_basis() != self.options.time {
             return Err(SplineError::Field {
                 step,
@@ -150,14 +150,6 @@ impl<R: Real> Solver<R> {
         Ok(())
     }
 
-    fn grid_of(&self, level: usize) -> Result<Grid<R>, SplineError> {
-        let mut grid = self.grid;
-        for _ in 0..level {
-            grid = grid.halved()?;
-        }
-        Ok(grid)
-    }
-
     /// Takes a step; the first of a level begins by halving the grid. Steps are taken in order, from 0 on.
     ///
     /// # Errors
@@ -167,21 +159,9 @@ impl<R: Real> Solver<R> {
         let (mut field, level) = self.field_at(step)?;
         let (mut system, terms) = self.linearise(&field, level, step, true)?;
         let gradient = system.gradient(&field);
-        let options = &self.options;
-        let (most, tolerance) = (options.iterations, options.tolerance);
-        let solution = conjugate::solve(&mut system, gradient, most, tolerance);
-        let (change, iterations) = solution.ok_or(SplineError::NotFinite {
-            step,
-            what: "the system",
-        })?;
-        let mut size = 0.0f64;
-        for (node, change) in field.nodes.iter_mut().zip(&change) {
-            for (value, &change) in node.flat_mut().iter_mut().zip(change.flat()) {
-                *value += change;
-                size = size.max(change.wide().abs());
-            }
-        }
-        if !field.is_finite() {
+        let (change, iterations) = conjugate::step(&mut system, gradient, &self.options, step)?;
+        let size = add_change(&mut field.nodes, &change);
+        if !are_finite(&field.nodes) {
             let what = "the step";
             return Err(SplineError::NotFinite { step, what });
         }
@@ -202,26 +182,7 @@ impl<R: Real> Solver<R> {
     /// # Errors
     /// If there is no such step, or the field is not on the grid of the step before.
     pub(crate) fn field_at(&self, step: usize) -> Result<(SplineField<R>, usize), SplineError> {
-        if step >= self.steps() {
-            return Err(SplineError::Step {
-                step,
-                steps: self.steps(),
-            });
-        }
-        let level = self.options.level(step);
-        let grid = self.grid_of(level)?;
-        let mut field = self.field.clone();
-        while field.grid().cells[0] < grid.cells[0] {
-            field = field.refined()?;
-        }
-        if *field.grid() != grid {
-            return Err(SplineError::Field {
-                step,
-                found: format!("{:?}", field.grid()),
-                wanted: format!("{grid:?} or one coarser"),
-            });
-        }
-        Ok((field, level))
+        before_step(&self.field, self.grid, &self.options, step)
     }
 
     /// What was given.

@@ -3,10 +3,11 @@
 use crate::basis::TimeBasis;
 use crate::cell::Node;
 use crate::error::SplineError;
-use crate::field::{SplineField, refine};
+use crate::field::{SplineField, check_coefficients, refine};
 use crate::grid::Grid;
+use crate::levels::OnGrid;
 use crate::real::Real;
-use crate::sequence::lengths;
+use crate::sequence::length;
 
 /// Functions of time that act between two key frames.
 pub(super) const ACTING: usize = 3;
@@ -54,22 +55,8 @@ impl<R: Real> SequenceField<R> {
         }
         let grid = grid.checked()?;
         let functions = times.len() + 1;
-        let wanted = grid.size() as f64 * functions as f64 * 3.0;
-        if coefficients.len() as f64 != wanted {
-            return Err(SplineError::Lengths {
-                what: "coefficients",
-                found: coefficients.len(),
-                wanted: wanted as usize,
-            });
-        }
-        if let Some(index) = coefficients.iter().position(|c| !c.wide().is_finite()) {
-            return Err(SplineError::Input {
-                what: "coefficient",
-                index,
-                found: format!("{:?}", coefficients[index]),
-                also: "",
-            });
-        }
+        let wanted = grid.size().saturating_mul(3 * functions);
+        check_coefficients(coefficients, wanted)?;
         let mut out = Self::zero(grid, times);
         let entries = out.entries();
         let each = coefficients.chunks_exact(3 * functions);
@@ -122,43 +109,20 @@ impl<R: Real> SequenceField<R> {
     /// If there is no such interval.
     pub fn part(&self, s: usize) -> SplineField<R, 2> {
         let mut out = SplineField::zero(self.grid, self.basis(s));
-        self.take(&self.nodes, s, &mut out.nodes);
+        take(&self.nodes, self.entries(), s, &mut out.nodes);
         out
     }
 
     /// The functions that act from key frame `s` to the next, in a time from 0 to 1 there.
     fn basis(&self, s: usize) -> TimeBasis {
-        let lengths = lengths(&self.times);
-        let h = lengths[s];
-        let before = if s == 0 { h } else { lengths[s - 1] };
-        let after = lengths.get(s + 1).copied().unwrap_or(h);
-        // De Boor's recursion, with the first and the last interval repeated beyond the ends.
+        // The first and the last interval are repeated beyond the ends.
+        let last = self.times.len() - 2;
+        let of = |s: usize| length(&self.times, s);
+        let (before, h, after) = (of(s.saturating_sub(1)), of(s), of((s + 1).min(last)));
+        // De Boor's recursion.
         let (a, b) = (h / (before + h), h / (h + after));
         let functions = [[a, -2.0 * a, a], [1.0 - a, 2.0 * a, -a - b], [0.0, 0.0, b]];
         TimeBasis::Quadratic(functions.map(|function| function.map(|x| x * h)))
-    }
-
-    /// What of a vector like the coefficients acts from key frame `s` to the next.
-    pub(super) fn take(&self, vector: &[Node<R>], s: usize, out: &mut [Node<R, 2>]) {
-        take(vector, self.entries(), s, out);
-    }
-
-    /// Adds a change to the coefficients; its largest number.
-    pub(super) fn add(&mut self, change: &[Node<R>]) -> f64 {
-        let mut size = 0.0f64;
-        for (node, change) in self.nodes.iter_mut().zip(change) {
-            for (value, &change) in node.flat_mut().iter_mut().zip(change.flat()) {
-                *value += change;
-                size = size.max(change.wide().abs());
-            }
-        }
-        size
-    }
-
-    /// Whether all coefficients are finite.
-    pub(super) fn is_finite(&self) -> bool {
-        let finite = |node: &Node<R>| node.flat().iter().all(|c| c.wide().is_finite());
-        self.nodes.iter().all(finite)
     }
 
     /// The same field on a grid of half the spacing.
@@ -170,6 +134,16 @@ impl<R: Real> SequenceField<R> {
         let (entries, finer) = (self.entries(), out.grid);
         refine(&self.grid, &self.nodes, entries, &finer, &mut out.nodes);
         Ok(out)
+    }
+}
+
+impl<R: Real> OnGrid<R> for SequenceField<R> {
+    fn grid(&self) -> &Grid<R> {
+        &self.grid
+    }
+
+    fn refined(&self) -> Result<Self, SplineError> {
+        self.refined()
     }
 }
 

@@ -34,17 +34,19 @@ use rayon::prelude::*;
 pub use self::field::SequenceField;
 use self::system::SequenceSystem;
 use crate::band::by_cell;
+use crate::cell::{add_change, are_finite};
 use crate::conjugate;
 use crate::error::SplineError;
 use crate::grid::Grid;
 use crate::hop::{Hop, Pass};
+use crate::levels::{before_step, grid_of};
 use crate::options::{Options, Weights};
 use crate::problem::{Cloud, Pairs, extent};
 use crate::real::Real;
 use crate::solver::{StepReport, Terms};
 use crate::targets::Surface;
 
-/// The steps that a run may have, by which the random numbers of hops are apart.
+/// More steps than options may have: by so much the random numbers of hops are apart.
 const MOST_STEPS: usize = 1 << 18;
 
 /// The most key frames.
@@ -109,11 +111,10 @@ fn two<T>(all: &[Arc<T>], s: usize) -> [Arc<T>; 2] {
     [Arc::clone(&all[s]), Arc::clone(&all[s + 1])]
 }
 
-/// The lengths of the intervals, of which the mean is 1.
-fn lengths(times: &[f64]) -> Vec<f64> {
+/// The length of interval `s`, where the mean of all is 1.
+fn length(times: &[f64], s: usize) -> f64 {
     let mean = (times[times.len() - 1] - times[0]) / (times.len() - 1) as f64;
-    let length = |two: &[f64]| (two[1] - two[0]) / mean;
-    times.windows(2).map(length).collect()
+    (times[s + 1] - times[s]) / mean
 }
 
 /// Finds a field through many key frames by Gauss-Newton steps, as [`crate::Solver`] does between two.
@@ -153,13 +154,10 @@ impl<R: Real> SequenceSolver<R> {
             .par_iter()
             .map(|shape| Arc::new(Surface::new(shape)))
             .collect();
-        let lengths = lengths(&times);
+        let lengths: Vec<f64> = (0..pairs.len()).map(|s| length(&times, s)).collect();
         let [lower, upper] = extent(shapes.iter().map(Arc::as_ref), pairs.iter());
         let grid = Grid::around(lower, upper, options.spacing, options.margin)?;
-        let mut finest = grid;
-        for _ in 1..options.steps.len() {
-            finest = finest.halved()?;
-        }
+        let finest = grid_of(grid, options.steps.len() - 1)?;
         let clouds: Vec<Arc<Vec<[R; 3]>>> = shapes
             .par_iter()
             .map(|shape| {
@@ -213,7 +211,8 @@ impl<R: Real> SequenceSolver<R> {
     /// # Errors
     /// If the field's grid or key frames are not this solver's there.
     pub fn resume_from(&mut self, field: SequenceField<R>, step: usize) -> Result<(), SplineError> {
-        let wanted = self.grid_of(self.options.level(step.saturating_sub(1)))?;
+        let level = self.options.level(step.saturating_sub(1));
+        let wanted = grid_of(self.grid, level)?;
         if *field.grid() != wanted || field.times() != self.field.times() {
             return Err(SplineError::Field {
                 step,
@@ -223,36 +222,6 @@ impl<R: Real> SequenceSolver<R> {
         }
         self.field = field;
         Ok(())
-    }
-
-    fn grid_of(&self, level: usize) -> Result<Grid<R>, SplineError> {
-        let mut grid = self.grid;
-        for _ in 0..level {
-            grid = grid.halved()?;
-        }
-        Ok(grid)
-    }
-
-    /// The field before a step, on the grid of the step, and its level.
-    fn field_at(&self, step: usize) -> Result<(SequenceField<R>, usize), SplineError> {
-        let steps = self.steps().min(MOST_STEPS);
-        if step >= steps {
-            return Err(SplineError::Step { step, steps });
-        }
-        let level = self.options.level(step);
-        let grid = self.grid_of(level)?;
-        let mut field = self.field.clone();
-        while field.grid().cells[0] < grid.cells[0] {
-            field = field.refined()?;
-        }
-        if *field.grid() != grid {
-            return Err(SplineError::Field {
-                step,
-                found: format!("{:?}", field.grid()),
-                wanted: format!("{grid:?} or one coarser"),
-            });
-        }
-        Ok((field, level))
     }
 
     /// The system at a field, and the terms as means over the hops.
@@ -299,17 +268,12 @@ impl<R: Real> SequenceSolver<R> {
     /// If there is no such step, the field is not on the grid of the step before, or a result is not
     /// finite; the field is then as before.
     pub fn advance(&mut self, step: usize) -> Result<StepReport, SplineError> {
-        let (mut field, level) = self.field_at(step)?;
+        let (mut field, level) = before_step(&self.field, self.grid, &self.options, step)?;
         let (mut system, terms) = self.linearise(&field, level, step, true)?;
         let gradient = system.gradient(&field);
-        let (most, tolerance) = (self.options.iterations, self.options.tolerance);
-        let solution = conjugate::solve(&mut system, gradient, most, tolerance);
-        let (change, iterations) = solution.ok_or(SplineError::NotFinite {
-            step,
-            what: "the system",
-        })?;
-        let size = field.add(&change);
-        if !field.is_finite() {
+        let (change, iterations) = conjugate::step(&mut system, gradient, &self.options, step)?;
+        let size = add_change(&mut field.nodes, &change);
+        if !are_finite(&field.nodes) {
             let what = "the step";
             return Err(SplineError::NotFinite { step, what });
         }
