@@ -203,18 +203,6 @@ impl<const H: usize> PointMotion for CarriedShapes<H> {
         self.carry_to(points, from, to)
     }
 
-    fn path(&self, start: &[[f32; 3]], times: &[f64]) -> Vec<Vec<[f32; 3]>> {
-        let (mut at, mut now) = (start.to_vec(), 0.0);
-        let mut next = |&time: &f64| {
-            if time > now {
-                at = self.carry_to(&at, now, time);
-                now = time;
-            }
-            at.clone()
-        };
-        times.iter().map(&mut next).collect()
-    }
-
     fn velocities(&self, points: &[[f32; 3]], time: f64) -> Vec<[f32; 3]> {
         self.field.values(points, time as f32)
     }

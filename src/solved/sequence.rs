@@ -157,18 +157,6 @@ impl<const H: usize> PointMotion for CarriedSequence<H> {
         points
     }
 
-    fn path(&self, start: &[[f32; 3]], times: &[f64]) -> Vec<Vec<[f32; 3]>> {
-        let (mut at, mut now) = (start.to_vec(), 0.0);
-        let mut next = |&time: &f64| {
-            if time > now {
-                at = self.carry(&at, now, time);
-                now = time;
-            }
-            at.clone()
-        };
-        times.iter().map(&mut next).collect()
-    }
-
     fn velocities(&self, points: &[[f32; 3]], time: f64) -> Vec<[f32; 3]> {
         let (s, (within, part)) = (self.interval(time), self.at(time));
         let length = (self.times[s + 1] - self.times[s]) as f32;

@@ -53,8 +53,18 @@ pub trait PointMotion: Sync {
     /// Where points that are at `points` at time `from` are at time `to`.
     fn carry(&self, points: &[[f32; 3]], from: f64, to: f64) -> Vec<[f32; 3]>;
 
-    /// Positions at each of `times`, which ascend, of points that are at `start` at time 0.
-    fn path(&self, start: &[[f32; 3]], times: &[f64]) -> Vec<Vec<[f32; 3]>>;
+    /// Positions at each of `times`, which ascend, of points that are at `start` at time 0: each from the one before.
+    fn path(&self, start: &[[f32; 3]], times: &[f64]) -> Vec<Vec<[f32; 3]>> {
+        let (mut at, mut now) = (start.to_vec(), 0.0);
+        let mut next = |&time: &f64| {
+            if time > now {
+                at = self.carry(&at, now, time);
+                now = time;
+            }
+            at.clone()
+        };
+        times.iter().map(&mut next).collect()
+    }
 
     /// The velocity of points, normalised length per unit of time.
     fn velocities(&self, points: &[[f32; 3]], time: f64) -> Vec<[f32; 3]>;
