@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use isomorph_training::recipe::natural_order;
+use isomorph_training::recipe::files_in;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -200,7 +200,7 @@ impl GroundTruth {
     }
 
     /// The vertices of one frame in normalised coordinates.
-    pub(super) fn normalised(&self, frame: usize, normalisation: &Normalisation) -> Vec<[f32; 3]> {
+    pub(crate) fn normalised(&self, frame: usize, normalisation: &Normalisation) -> Vec<[f32; 3]> {
         let vertices = self.frames[frame].iter();
         vertices
             .map(|&vertex| normalisation.apply(vertex))
@@ -246,22 +246,8 @@ fn unreadable(path: &Path, reason: std::io::Error) -> TruthError {
 
 /// The PLY, OBJ and OFF files of a folder, in natural order.
 fn meshes_in(folder: &Path) -> Result<Vec<PathBuf>, TruthError> {
-    let failed = |reason| unreadable(folder, reason);
-    let mut named = Vec::new();
-    for entry in std::fs::read_dir(folder).map_err(failed)? {
-        let path = entry.map_err(failed)?.path();
-        let extension = path.extension().unwrap_or_default();
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        let mesh = ["ply", "obj", "off"]
-            .iter()
-            .any(|known| extension.eq_ignore_ascii_case(known));
-        // A hidden file is no frame: some systems leave one beside each file.
-        if mesh && !name.starts_with('.') {
-            named.push((name.into_owned(), path));
-        }
-    }
-    named.sort_by(|(a, _), (b, _)| natural_order(a, b));
-    Ok(named.into_iter().map(|(_, path)| path).collect())
+    let found = files_in(folder, &["ply", "obj", "off"]);
+    found.map_err(|reason| unreadable(folder, reason))
 }
 
 /// Whether a shape is the first one with its vertices moved.

@@ -1,5 +1,7 @@
 //! Ground truths as they are read, and as they are refused.
 
+use isomorph_training::recipe::natural_order;
+
 use super::*;
 use crate::evaluate::testing::sphere;
 

@@ -1,6 +1,7 @@
 //! The files that a folder or a pattern stands for, in the order in which people count.
 
 use std::cmp::Ordering;
+use std::io;
 use std::path::{Path, PathBuf};
 
 /// Endings of the files of a folder that are shapes for certain; a pattern may name others.
@@ -18,20 +19,8 @@ pub(super) fn stands_for_many(path: &Path) -> bool {
 /// # Errors
 /// What the file system says, or what is wrong with the pattern.
 pub(super) fn listed(path: &Path) -> Result<Vec<PathBuf>, String> {
-    let mut files: Vec<PathBuf> = Vec::new();
-    if path.is_dir() {
-        for entry in std::fs::read_dir(path).map_err(|error| error.to_string())? {
-            let file = entry.map_err(|error| error.to_string())?.path();
-            let extension = file.extension().unwrap_or_default();
-            let known = SHAPES
-                .iter()
-                .any(|known| extension.eq_ignore_ascii_case(known));
-            // A hidden file is no frame: some systems leave one beside each file.
-            let hidden = name(&file).starts_with('.');
-            if known && !hidden && file.is_file() {
-                files.push(file);
-            }
-        }
+    let mut files = if path.is_dir() {
+        files_in(path, &SHAPES).map_err(|error| error.to_string())?
     } else {
         // Patterns act in the name of the file alone: a whole tree is not searched by accident.
         let folder = path.parent().unwrap_or(Path::new(""));
@@ -43,15 +32,37 @@ pub(super) fn listed(path: &Path) -> Result<Vec<PathBuf>, String> {
             ..glob::MatchOptions::default()
         };
         let found = glob::glob_with(&pattern, visible).map_err(|error| error.to_string())?;
-        for file in found {
-            let file = file.map_err(|error| error.to_string())?;
-            if file.is_file() {
-                files.push(file);
-            }
+        let files: Result<Vec<PathBuf>, _> = found.collect();
+        in_order(files.map_err(|error| error.to_string())?)
+    };
+    files.retain(|file| file.is_file());
+    Ok(files)
+}
+
+/// What a folder holds whose names have one of these endings, in the order in which people count.
+///
+/// # Errors
+/// What the file system says.
+pub fn files_in(folder: &Path, endings: &[&str]) -> io::Result<Vec<PathBuf>> {
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(folder)? {
+        let file = entry?.path();
+        let ending = file.extension().unwrap_or_default();
+        let known = endings
+            .iter()
+            .any(|known| ending.eq_ignore_ascii_case(known));
+        // A hidden file is no frame: some systems leave one beside each file.
+        if known && !name(&file).starts_with('.') {
+            files.push(file);
         }
     }
-    files.sort_by(|a, b| natural_order(&name(a), &name(b)).then_with(|| a.cmp(b)));
-    Ok(files)
+    Ok(in_order(files))
+}
+
+/// Files of one folder in the order of their names.
+fn in_order(mut files: Vec<PathBuf>) -> Vec<PathBuf> {
+    files.sort_by(|a, b| natural_order(&name(a), &name(b)));
+    files
 }
 
 fn name(file: &Path) -> String {
