@@ -85,7 +85,7 @@ pub(super) fn compare(surface: &SampledSurface, truth: &SampledSurface, time: f6
 ///
 /// # Panics
 /// If the numbers of vertices differ or are zero.
-pub(super) fn mean_squared_error(found: &[[f32; 3]], truth: &[[f32; 3]]) -> f64 {
+pub(crate) fn mean_squared_error(found: &[[f32; 3]], truth: &[[f32; 3]]) -> f64 {
     assert_eq!(found.len(), truth.len(), "vertices found and true ones");
     assert!(!truth.is_empty(), "the error of no vertices");
     let squared = found.iter().zip(truth).map(|(a, b)| {

@@ -43,6 +43,7 @@ mod vertex_path;
 pub(crate) use candidate::{Candidate, Carried, Purpose};
 pub(crate) use error::{EvaluateError, TruthError};
 pub use evaluation::{Compared, Drift, Evaluation, FrameResult, KeysEvaluation, Metrics};
+pub(crate) use metrics::mean_squared_error;
 pub(crate) use reference::{Options, Reference};
 pub use truth::GroundTruth;
 pub(crate) use truth::Span;

@@ -1,14 +1,18 @@
 //! A run held against the true frames between its two shapes.
 
+use serde::Serialize;
+
 use super::measure::{Ruler, measure};
 use super::prepare;
 use super::stop::StopFlag;
 use super::trained::Trained;
 use crate::atomic::write_atomically;
 use crate::error::{Error, Result};
-use crate::evaluate::{Drift, Evaluation, GroundTruth, KeysEvaluation, Options, Reference, Span};
+use crate::evaluate::{
+    Drift, Evaluation, GroundTruth, KeysEvaluation, Options, Reference, Span, mean_squared_error,
+};
 use crate::event::Event;
-use crate::shape::Normalisation;
+use crate::shape::{Keyframes, Normalisation};
 
 /// How closely to look.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -81,14 +85,10 @@ impl Trained {
             stop,
         };
         let evaluation = measure(self.learned(), &ruler, &mut on_event)?;
-        let text = serde_json::to_string(&evaluation)? + "\n";
-        let file = self.path().join("evaluation.json");
-        write_atomically(&file, |out| out.write_all(text.as_bytes()))?;
+        self.keep(&evaluation)?;
         Ok(evaluation)
     }
-}
 
-impl Trained {
     /// Measures a run through many key frames, which are the frames `keys` of the truth, against all frames between
     /// them, and leaves the numbers in its folder, in `evaluation.json`. Two key frames are many enough.
     ///
@@ -112,14 +112,7 @@ impl Trained {
                 keyframes.keys.len()
             )));
         }
-        let spans: Vec<Span> = keys
-            .windows(2)
-            .map(|two| truth.span(two[0], two[1]))
-            .collect::<std::result::Result<_, _>>()?;
-        for (span, two) in spans.iter().zip(keyframes.keys.windows(2)) {
-            let [source, target] = [&two[0], &two[1]].map(|key| &key.cloud.points[..]);
-            truth.check_ends(*span, &keyframes.normalisation, source, target)?;
-        }
+        let spans = true_spans(truth, keys, &keyframes)?;
         let shapes: Vec<_> = keys.iter().map(|key| truth.shape(*key)).collect();
         let shapes: Vec<&_> = shapes.iter().collect();
         let normalisation = Normalisation::joint(&shapes)?;
@@ -149,10 +142,17 @@ impl Trained {
             drift: self.drift(truth, keys, &normalisation)?,
             segments,
         };
-        let text = serde_json::to_string(&evaluation)? + "\n";
-        let file = self.path().join("evaluation.json");
-        write_atomically(&file, |out| out.write_all(text.as_bytes()))?;
+        self.keep(&evaluation)?;
         Ok(evaluation)
+    }
+
+    /// Leaves numbers in the run's folder.
+    fn keep(&self, evaluation: &impl Serialize) -> Result<()> {
+        let text = serde_json::to_string(evaluation)? + "\n";
+        let file = self.path().join("evaluation.json");
+        Ok(write_atomically(&file, |out| {
+            out.write_all(text.as_bytes())
+        })?)
     }
 
     /// How far vertices that are carried from the first key frame are from the true ones.
@@ -178,20 +178,13 @@ impl Trained {
                 frames.push((frame, clock.unit(own)?));
             }
         }
-        let apply = |frame: usize| -> Vec<[f32; 3]> {
-            let vertices = truth.vertices(frame).iter();
-            vertices.map(|x| learned.normalisation.apply(*x)).collect()
-        };
+        let apply = |frame: usize| truth.normalised(frame, &learned.normalisation);
         let start = apply(first);
         let units: Vec<f64> = frames.iter().map(|(_, unit)| *unit).collect();
         let path = learned.path(&start, &units)?;
         // From the units of the run to those in which everything else is measured.
         let scale = normalisation.scale / learned.normalisation.scale;
-        let off = |a: &[[f32; 3]], b: &[[f32; 3]]| {
-            let squares = a.as_flattened().iter().zip(b.as_flattened());
-            let sum: f64 = squares.map(|(a, b)| f64::from(a - b).powi(2)).sum();
-            scale * (sum / a.len() as f64).sqrt()
-        };
+        let off = |a: &[[f32; 3]], b: &[[f32; 3]]| scale * mean_squared_error(a, b).sqrt();
         let between: Vec<f64> = (frames.iter().zip(&path))
             .filter(|((frame, _), _)| !keys.contains(frame))
             .map(|((frame, _), carried)| off(carried, &apply(*frame)))
@@ -204,6 +197,26 @@ impl Trained {
             there_and_back: off(&back, &start),
         }))
     }
+}
+
+/// From each of these frames of a truth to the next, if they are the key frames of a run.
+///
+/// # Errors
+/// Frames that are not those of the run, or that have none between them.
+pub(super) fn true_spans(
+    truth: &GroundTruth,
+    frames: &[usize],
+    keyframes: &Keyframes,
+) -> Result<Vec<Span>> {
+    let spans: Vec<Span> = frames
+        .windows(2)
+        .map(|two| truth.span(two[0], two[1]))
+        .collect::<std::result::Result<_, _>>()?;
+    for (span, two) in spans.iter().zip(keyframes.keys.windows(2)) {
+        let [source, target] = [&two[0], &two[1]].map(|key| &key.cloud.points[..]);
+        truth.check_ends(*span, &keyframes.normalisation, source, target)?;
+    }
+    Ok(spans)
 }
 
 /// The coordinates in which everything is measured: those of the true ends.

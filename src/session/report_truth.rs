@@ -1,8 +1,9 @@
 //! The true shape at any time of a run, for the page of the run.
 
+use super::evaluate::true_spans;
 use super::prepare;
 use super::trained::Trained;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::evaluate::{GroundTruth, Span};
 use crate::geometry::{Mesh, TriangleSearch};
 use crate::surface::learned::Learned;
@@ -22,10 +23,21 @@ impl<'a> TrueShapes<'a> {
         [from, to]: [usize; 2],
     ) -> Result<Self> {
         let span = truth.span(from, to)?;
-        let normalisation = &trained.learned().normalisation;
         let keyframes = prepare::points_only(trained.recipe())?;
-        let [source, target] = [0, 1].map(|k| &keyframes.keys[k].cloud.points);
-        truth.check_ends(span, normalisation, source, target)?;
+        // Key frames in between must be where their times say: the shapes at other times follow from that.
+        let frames = keyframes.keys.iter().map(|key| {
+            let at = from as f64 + key.time * (to - from) as f64;
+            let frame = at.round();
+            if (at - frame).abs() > 1e-6 {
+                return Err(Error::usage(format!(
+                    "the key frame at {} is between two frames of the ground truth",
+                    trained.clock().own(key.time)
+                )));
+            }
+            Ok(frame as usize)
+        });
+        let frames: Vec<usize> = frames.collect::<Result<_>>()?;
+        true_spans(truth, &frames, &keyframes)?;
         Ok(Self { truth, span })
     }
 
