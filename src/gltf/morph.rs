@@ -239,11 +239,11 @@ fn primitives(
 }
 
 /// The weights of all targets over time.
-fn animation(times: &[f64], builder: &mut Builder) -> Value {
-    let seconds: Vec<f32> = times.iter().map(|second| *second as f32).collect();
-    let targets = times.len() - 1;
-    let mut weights = vec![0.0; times.len() * targets];
-    for k in 1..times.len() {
+fn animation(seconds: &[f64], builder: &mut Builder) -> Value {
+    let seconds: Vec<f32> = seconds.iter().map(|second| *second as f32).collect();
+    let targets = seconds.len() - 1;
+    let mut weights = vec![0.0; seconds.len() * targets];
+    for k in 1..seconds.len() {
         weights[k * targets + k - 1] = 1.0;
     }
     let (input, output) = (

@@ -99,9 +99,9 @@ fn mesh(
 
 /// Shows each mesh from half-way to the one before until half-way to the one after.
 fn animation(stills: &[Still], nodes: &[usize], builder: &mut Builder) -> Value {
-    let times: Vec<f64> = stills.iter().map(|still| still.second).collect();
-    let half_way = times.windows(2).map(|pair| (pair[0] + pair[1]) / 2.0);
-    let ends = [times[0], times[times.len() - 1]];
+    let moments: Vec<f64> = stills.iter().map(|still| still.second).collect();
+    let half_way = moments.windows(2).map(|pair| (pair[0] + pair[1]) / 2.0);
+    let ends = [moments[0], moments[moments.len() - 1]];
     let seconds: Vec<f32> = ([ends[0]].into_iter().chain(half_way).chain([ends[1]]))
         .map(|second| second as f32)
         .collect();

@@ -15,11 +15,17 @@ use crate::atomic::write_atomically;
 /// Milliseconds for which the first and the last surface stand still.
 const HELD: u16 = 600;
 
-/// Draws surfaces at ascending times one after the other, there and back without end, each with its time below.
+/// Draws surfaces one after the other, there and back without end, each with its time below; `seconds` ascend and say
+/// when each is shown.
 ///
 /// # Errors
 /// [`PictureError`]; then no file is written.
-pub(crate) fn film(frames: &[Frame<'_>], view: &View, path: &Path) -> Result<(), PictureError> {
+pub(crate) fn film(
+    frames: &[Frame<'_>],
+    seconds: &[f32],
+    view: &View,
+    path: &Path,
+) -> Result<(), PictureError> {
     check(frames, view, path)?;
     let points = frames.iter().flat_map(|frame| frame.vertices);
     let camera = Camera::new(points.map(|&point| point.into()), view, text_width(LABEL));
@@ -32,8 +38,7 @@ pub(crate) fn film(frames: &[Frame<'_>], view: &View, path: &Path) -> Result<(),
             picture
         })
         .collect();
-    let times: Vec<f32> = frames.iter().map(|frame| frame.second).collect();
-    let bytes = animated(&pictures, &order(&times)).map_err(io::Error::other)?;
+    let bytes = animated(&pictures, &order(seconds)).map_err(io::Error::other)?;
     Ok(write_atomically(path, |out| out.write_all(&bytes))?)
 }
 
@@ -95,13 +100,12 @@ mod tests {
                 vertices,
                 triangles: &[[0, 1, 2]],
                 time,
-                second: 2.0 * time,
                 named: f64::from(time),
             })
             .collect();
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = folder.path().join("film.png");
-        film(&frames, &View::default(), &path).expect("a picture");
+        film(&frames, &[0.0, 1.0, 2.0], &View::default(), &path).expect("a picture");
         let file = io::BufReader::new(std::fs::File::open(&path).expect("a file"));
         let mut reader = png::Decoder::new(file).read_info().expect("a PNG");
         let control = reader.info().animation_control().copied();

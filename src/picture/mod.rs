@@ -45,8 +45,6 @@ pub(crate) struct Frame<'a> {
     pub triangles: &'a [[u32; 3]],
     /// Time in [0, 1]: the colour from blue over purple to orange.
     pub time: f32,
-    /// When it is shown in a film, in seconds.
-    pub second: f32,
     /// The time as the label has it.
     pub named: f64,
 }
@@ -207,7 +205,6 @@ mod tests {
                 vertices,
                 triangles,
                 time: number as f32,
-                second: number as f32,
                 named: f64::from(number),
             })
             .collect();
@@ -262,7 +259,6 @@ mod tests {
                 vertices,
                 triangles,
                 time: 0.5,
-                second: 0.5,
                 named: 0.5,
             };
             let view = View { height, ..FRONT };

@@ -3,7 +3,6 @@
 //! All lengths are in normalised units. The limits are those that no run of the samples and of the evaluation
 //! protocol comes near; a result beyond them is not what was asked for, whatever its cause.
 
-use super::clock::Clock;
 use crate::event::Event;
 use crate::geometry::density::usual_spacing;
 use crate::geometry::{Mesh, NeighbourSearch, TriangleSearch};
@@ -49,8 +48,6 @@ const PIECE: f64 = 0.01;
 pub(super) struct End {
     name: String,
     time: f64,
-    /// The time as the user counts.
-    own_time: f64,
     points: Vec<[f32; 3]>,
     mesh: Option<Mesh<f32>>,
     /// Whether each point lies at the border of what is known; empty where nothing is missing.
@@ -59,12 +56,11 @@ pub(super) struct End {
 
 impl End {
     /// All shapes of a run; of very many the first and the last.
-    pub(super) fn all(keys: &[Keyframe], clock: Clock) -> Vec<Self> {
+    pub(super) fn all(keys: &[Keyframe]) -> Vec<Self> {
         let count = keys.len();
         let end = |(k, key): (usize, &Keyframe)| Self {
             name: key_name(k, count),
             time: key.time,
-            own_time: clock.own(key.time),
             points: key.cloud.points.clone(),
             mesh: key.mesh.clone(),
             border: key.border.clone(),
@@ -82,7 +78,7 @@ impl End {
         };
         let said = self.findings(&frame.mesh);
         let doubtful = |(finding, cure): (String, &str)| Event::Doubtful {
-            finding: format!("the surface at {} {finding}", self.own_time),
+            finding: format!("the surface at {} {finding}", frame.entry.time),
             cure: cure.to_owned(),
         };
         said.into_iter().map(doubtful).collect()
@@ -253,7 +249,6 @@ mod tests {
         End {
             name: "source".to_owned(),
             time: 0.0,
-            own_time: 0.0,
             points: mesh.vertices.clone(),
             mesh: closed.then_some(mesh),
             border: Vec::new(),

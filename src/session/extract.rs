@@ -15,9 +15,7 @@ use crate::event::Event;
 use crate::formats::SurfaceFormat;
 use crate::picture;
 use crate::recipe::Recipe;
-use crate::surface::frames::{
-    CarriedSource, Frame, FrameOptions, OutputFormat, SECONDS, write_frames,
-};
+use crate::surface::frames::{CarriedSource, Frame, FrameOptions, OutputFormat, write_frames};
 
 /// What to write.
 #[derive(Clone, Debug, PartialEq)]
@@ -94,6 +92,9 @@ impl ExtractOptions {
         Ok(())
     }
 }
+
+/// How long an animation of two shapes runs, if nothing else is asked for.
+const SECONDS: f64 = 2.0;
 
 /// The most key frames whose surfaces all belong to the result.
 const SHOWN_KEYS: usize = 32;
@@ -242,7 +243,8 @@ impl Trained {
             )));
         }
         emit(Event::Drawing)?;
-        show(&frames, &frame_options.folder, options.film)?;
+        let film = options.film.then_some(&frame_options.seconds[..]);
+        show(&frames, &frame_options.folder, film)?;
         Ok(frames)
     }
 }
@@ -269,13 +271,13 @@ fn drawn(frame: &Frame) -> picture::Frame<'_> {
         vertices: &frame.mesh.vertices,
         triangles: &frame.mesh.triangles,
         time: frame.time as f32,
-        second: frame.second as f32,
         named: frame.entry.time,
     }
 }
 
-/// `preview.png`: up to nine of the frames, evenly chosen; and `animation.png`, all of them in turn.
-pub(super) fn show(frames: &[Frame], folder: &Path, film: bool) -> io::Result<()> {
+/// `preview.png`: up to nine of the frames, evenly chosen; and `animation.png`, all of them in turn, if `film` says in
+/// which second each is shown.
+pub(super) fn show(frames: &[Frame], folder: &Path, film: Option<&[f64]>) -> io::Result<()> {
     let filled = |frame: &&Frame| !frame.mesh.triangles.is_empty();
     let view = picture::View::default();
     let count = frames.len().min(SHOWN);
@@ -288,10 +290,17 @@ pub(super) fn show(frames: &[Frame], folder: &Path, film: bool) -> io::Result<()
         let path = folder.join("preview.png");
         picture::strip(&panels, &view, &path).map_err(io::Error::other)?;
     }
-    let mut all: Vec<_> = frames.iter().filter(filled).map(drawn).collect();
-    if film && !all.is_empty() {
-        all.sort_by(|a, b| a.second.total_cmp(&b.second));
-        picture::film(&all, &view, &folder.join("animation.png")).map_err(io::Error::other)?;
+    let Some(seconds) = film else {
+        return Ok(());
+    };
+    let shown = frames.iter().zip(seconds);
+    let mut all: Vec<_> = shown.filter(|(frame, _)| filled(frame)).collect();
+    if !all.is_empty() {
+        all.sort_by(|(_, a), (_, b)| a.total_cmp(b));
+        let seconds: Vec<f32> = all.iter().map(|(_, second)| **second as f32).collect();
+        let all: Vec<_> = all.into_iter().map(|(frame, _)| drawn(frame)).collect();
+        let path = folder.join("animation.png");
+        picture::film(&all, &seconds, &view, &path).map_err(io::Error::other)?;
     }
     Ok(())
 }

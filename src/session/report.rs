@@ -70,7 +70,7 @@ impl Trained {
     /// Those of [`Self::report`].
     pub(super) fn preview(&self) -> Result<()> {
         let frames = self.coarse()?;
-        show(&frames, &self.folder().meshes(), false)?;
+        show(&frames, &self.folder().meshes(), None)?;
         self.write_page(frames, None, Some(RELOADED))?;
         Ok(())
     }
@@ -113,7 +113,6 @@ impl Trained {
             let mesh = shape.mesh.moved(|x| self.learned().normalisation.apply(x));
             Some(Frame {
                 time: self.clock().unit(entry.time).ok()?,
-                second: entry.time,
                 entry,
                 components: mesh.components().len(),
                 mesh,

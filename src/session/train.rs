@@ -6,7 +6,6 @@ use isomorph_training::engine::{Engine, Trainer};
 
 use super::against_input::End;
 use super::checkpoint::{self, Checkpoint, CheckpointError};
-use super::clock::Clock;
 use super::folder::RunFolder;
 use super::learned::{self, Frame};
 use super::learner::{self, Learner, LearnerError, Outcome};
@@ -330,8 +329,7 @@ impl Session {
             on_event(&event);
             log.record(&event)?;
         }
-        let clock = Clock::of(&self.recipe);
-        Ok(Begun::new(run, lock, log, learner, &prepared, clock))
+        Ok(Begun::new(run, lock, log, learner, &prepared))
     }
 
     /// A run where its newest checkpoint left it: what is refused leaves it as it was.
@@ -382,8 +380,7 @@ impl Session {
             let text = self.recipe.to_toml();
             write_atomically(&run.recipe(), |out| out.write_all(text.as_bytes()))?;
         }
-        let clock = Clock::of(&self.recipe);
-        Ok(Begun::new(run, lock, log, learner, &prepared, clock))
+        Ok(Begun::new(run, lock, log, learner, &prepared))
     }
 }
 
@@ -419,7 +416,6 @@ impl Begun {
         log: RunLog,
         learner: Learner,
         prepared: &Prepared,
-        clock: Clock,
     ) -> Self {
         let keyframes = &prepared.keyframes;
         Self {
@@ -427,7 +423,7 @@ impl Begun {
             _lock: lock,
             log,
             learner,
-            ends: End::all(&keyframes.keys, clock),
+            ends: End::all(&keyframes.keys),
             frame: Frame {
                 normalisation: keyframes.normalisation,
                 bounds: keyframes.bounds,

@@ -43,9 +43,6 @@ impl OutputFormat {
     }
 }
 
-/// How long an animation of two shapes runs, if nothing else is asked for.
-pub(crate) const SECONDS: f64 = 2.0;
-
 /// What to write.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct FrameOptions {
@@ -131,8 +128,6 @@ pub(crate) struct Frame {
     pub entry: FrameEntry,
     /// The time, in `[0, 1]`.
     pub time: f64,
-    /// When it is shown in an animation, in seconds.
-    pub second: f64,
     /// The surface in normalised coordinates.
     pub mesh: Mesh<f32>,
     /// Connected pieces.
@@ -156,7 +151,6 @@ impl Frame {
         let agreement = learned.agreement(&found.mesh.vertices, time)?;
         Ok(Self {
             time,
-            second: SECONDS * time,
             entry: FrameEntry {
                 time,
                 key: None,
@@ -279,7 +273,6 @@ fn write_frame(
     let mut frame = Frame::measured(learned, found, time, slope_error)?;
     frame.trust = trust;
     frame.entry.time = options.names[k];
-    frame.second = options.seconds[k];
     frame.entry.key = options.keys.iter().position(|key| *key == time);
     frame.entry.surface = surface;
     frame.entry.carried = carried;
