@@ -115,6 +115,7 @@ pub fn plan_morph(files: &[PathBuf], options: &MorphOptions) -> Result<MorphPlan
 fn planned(files: &[PathBuf], options: &MorphOptions, pairs: &str) -> Result<Recipe> {
     let set = [
         format!("preset={}", options.preset),
+        format!("data.correspondences={pairs}"),
         format!("result.frames={}", options.frames),
     ];
     let mut recipe = match (files, &options.times) {
@@ -141,7 +142,6 @@ fn planned(files: &[PathBuf], options: &MorphOptions, pairs: &str) -> Result<Rec
         }
     };
     recipe.with_all(&set)?;
-    recipe.with(&format!("data.correspondences={pairs}"))?;
     Ok(recipe)
 }
 
