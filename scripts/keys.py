@@ -23,7 +23,7 @@ from pathlib import Path
 
 import numpy as np
 
-from isomorph_paper import PaperError, command_line, compact, figures, record
+from isomorph_paper import PaperError, command_line, compact, degrade, figures, record
 from isomorph_paper.command_line import ROOT
 from isomorph_paper.runs import answer, output
 from isomorph_paper.sequences import (
@@ -158,13 +158,8 @@ class Bench:
         """Points uniform over the area of a frame, by random numbers of its own, with normals of the triangles."""
         rng = np.random.default_rng([7, frame])
         vertices, triangles = self.sequence.frames[frame], self.sequence.triangles
-        vectors = area_vectors(vertices, triangles)
-        areas = np.linalg.norm(vectors, axis=1)
-        chosen = rng.choice(len(triangles), POINTS, p=areas / areas.sum())
-        root, split = np.sqrt(rng.random(POINTS)), rng.random(POINTS)
-        weights = np.stack([1 - root, root * (1 - split), root * split], 1)
-        points = np.einsum("pc,pcx->px", weights, vertices[triangles[chosen]])
-        return points, unit(vectors[chosen])
+        places = degrade.sampled(vertices, triangles, POINTS, rng)
+        return places.on(vertices), unit(area_vectors(vertices, places.triangles))
 
 
 def row(name: str, label: str, seed: int, found: list[dict]) -> dict:
