@@ -266,6 +266,13 @@ fn a_sequence_is_measured_against_all_frames_between_its_key_frames() {
         "8",
     ];
     place.isomorph(&pair).refused(2, &["--keys"]);
+    // The page holds each surface against the truth at its time, and all key frames against theirs.
+    let ends = |from, to| {
+        let truth = ["--ground-truth", "fall.anime", "--from", from, "--to", to];
+        place.isomorph(&[&["view", "many", "--no-browser"], &truth[..]].concat())
+    };
+    ends("0", "8").succeeded();
+    ends("1", "8").refused(2, &["between two frames of the ground truth"]);
 }
 
 #[test]
