@@ -141,14 +141,19 @@ struct ProgressArgs {
     /// Print events as JSON on standard output, one object per line, and no lines for people
     #[arg(long, conflicts_with = "quiet")]
     json: bool,
+
+    /// Print every event with its second, and every logged step with all of its terms
+    #[arg(long, short, conflicts_with_all = ["quiet", "json"])]
+    verbose: bool,
 }
 
 impl ProgressArgs {
     /// What shows the events of the run in this folder.
     fn terminal(self, run: &Path) -> Terminal {
-        match self.json {
-            true => Terminal::json(),
-            false => self.quiet.terminal(run),
+        match (self.json, self.verbose) {
+            (true, _) => Terminal::json(),
+            (_, true) => Terminal::verbose(run),
+            _ => self.quiet.terminal(run),
         }
     }
 

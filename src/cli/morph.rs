@@ -43,6 +43,11 @@ pub(super) struct MorphArgs {
     #[arg(long, value_name = "FILE")]
     pairs: Option<String>,
 
+    /// Lay the shapes onto each other first, so that only the rest of the motion is learned: none, rigid, similarity
+    /// or auto, which does what is clearly needed; the results lie where the files do
+    #[arg(long, value_name = "HOW", default_value = "auto")]
+    align: String,
+
     /// Values of all other keys: instant, quick, default, quality or paper [default: instant, and quick where
     /// instant fails]
     #[arg(long)]
@@ -73,6 +78,7 @@ pub(super) fn run(args: MorphArgs) -> Result {
     let plan_with = |preset: &str| {
         let options = MorphOptions {
             pairs: args.pairs.clone(),
+            align: args.align.clone(),
             preset: preset.to_owned(),
             frames: args.frames as usize,
             times: args.times.clone(),

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 
 use super::error::{FEWEST_POINTS, ShapeError};
-use crate::geometry::linear::is_finite;
+use crate::geometry::linear::{is_finite, times};
+use crate::geometry::similarity::Similarity;
 use crate::geometry::{Extent, Mesh, cloud_area};
 
 /// A mesh or a point cloud as its file gives it: in the user's coordinates and vertex order.
@@ -115,6 +116,22 @@ impl Shape {
         let normals = self.mesh.normals.as_ref();
         self.mesh.normals = normals.map(|normals| stay().map(|k| normals[k]).collect());
         self
+    }
+
+    /// The same shape elsewhere, turned and sized; vertices keep their numbers.
+    pub(crate) fn laid_by(&self, way: &Similarity) -> Self {
+        let mut shape = self.clone();
+        if *way == Similarity::IDENTITY {
+            return shape;
+        }
+        for vertex in &mut shape.mesh.vertices {
+            *vertex = way.apply(*vertex);
+        }
+        for normal in shape.mesh.normals.iter_mut().flatten() {
+            let turned = times(&way.rotation, normal.map(f64::from));
+            *normal = turned.map(|part| part as f32);
+        }
+        shape
     }
 
     /// Without points that have no place; a note says how many they were.

@@ -14,6 +14,8 @@
 //! | `density.rs` | the spacing of points, and the area that they stand for |
 //! | `triangles.rs` | closest points of a mesh, and its winding number |
 //! | `winding.rs` | winding numbers of points with normals |
+//! | `natural.rs` | natural cubic splines |
+//! | `similarity.rs` | turns, shifts and a factor of size, and rotations as quaternions |
 //!
 //! Conventions: triangles wind counter-clockwise seen from outside, so normals point outwards and the
 //! volume of a closed surface is positive. Vertices are `f64` in the user's coordinates and `f32` in
@@ -26,9 +28,11 @@ mod edges;
 mod extent;
 pub(crate) mod linear;
 mod mesh;
+pub(crate) mod natural;
 mod neighbours;
 mod orient;
 mod parts;
+pub(crate) mod similarity;
 #[cfg(test)]
 pub(crate) mod testing;
 mod triangles;

@@ -75,7 +75,7 @@ pub(crate) use rotation::RigidMotion;
 pub use stage::MatchStage;
 pub(crate) use stage::Report;
 
-use crate::shape::{Correspondences, Normalisation, Shape};
+use crate::shape::{Correspondences, Normalisation, Shape, ShapeError};
 use anchors::{Anchors, Holds};
 use level::NodeMotion;
 use pairs::{Laid, Sites};
@@ -157,6 +157,42 @@ pub(crate) fn match_shapes(
     };
     report(MatchStage::Pairs, 1, 1);
     Ok(matching)
+}
+
+/// Points and nodes of each surface that decide a rigid motion.
+const LAID: [usize; 2] = [4000, 500];
+
+/// The rigid motion, in the shapes' coordinates, that lays the surface of one shape roughly onto that of another: none
+/// unless it brings them clearly closer, or if `is_free` the closest in any case.
+///
+/// # Errors
+/// [`ShapeError`] if a shape has no surface.
+pub(crate) fn rigid_motion(
+    source: &Shape,
+    target: &Shape,
+    is_free: bool,
+    seed: u64,
+) -> Result<RigidMotion, ShapeError> {
+    let frame = Normalisation::joint(&[source, target])?;
+    let surface = |shape: &Shape| Surface::new(shape, &frame, LAID, seed);
+    let (from, to) = rayon::join(|| surface(source), || surface(target));
+    let (from, to) = (from?, to?);
+    let alignment = match is_free {
+        true => rigid::lay(&from, &to),
+        false => rigid::align(&from, &to, &Anchors::default()),
+    };
+    if alignment.motion == RigidMotion::IDENTITY {
+        return Ok(RigidMotion::IDENTITY);
+    }
+    let Rigid {
+        rotation,
+        translation,
+        ..
+    } = Rigid::new(&alignment, &frame);
+    Ok(RigidMotion {
+        rotation,
+        translation,
+    })
 }
 
 /// The motions there and back: those from each width until all have come near, then the two that

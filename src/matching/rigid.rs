@@ -55,7 +55,31 @@ pub(super) fn align(source: &Surface, target: &Surface, anchors: &Anchors) -> Al
     if !anchors.is_empty() {
         return sides.best_with_anchors(tried, unmoved);
     }
-    let mut best = (RigidMotion::IDENTITY, unmoved, CLEARLY);
+    best_of(tried, (RigidMotion::IDENTITY, unmoved), unmoved)
+}
+
+/// The best of all candidates, where the shapes need not stay as they are: the closest position near that one, unless
+/// another is clearly closer.
+pub(super) fn lay(source: &Surface, target: &Surface) -> Alignment {
+    let none = Anchors::default();
+    let sides = Sides::new(source, target, &none);
+    let unmoved = sides.distance(&RigidMotion::IDENTITY);
+    let tried = sides.improved(sides.candidates());
+    // The first is that which began with no motion.
+    let preferred = match tried[0].1 < unmoved {
+        true => tried[0],
+        false => (RigidMotion::IDENTITY, unmoved),
+    };
+    best_of(tried, preferred, unmoved)
+}
+
+/// The closest of all, where the preferred one gives way to what is clearly closer only.
+fn best_of(
+    tried: Vec<(RigidMotion, f64)>,
+    preferred: (RigidMotion, f64),
+    unmoved: f64,
+) -> Alignment {
+    let mut best = (preferred.0, preferred.1, CLEARLY);
     for (motion, distance) in tried {
         if distance < best.2 * best.1 {
             best = (motion, distance, BARELY);

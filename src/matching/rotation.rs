@@ -49,7 +49,7 @@ impl RigidMotion {
 
     /// The motion with the least `sum |R x_k + t - y_k|^2` over pairs `(x_k, y_k)`; the identity of
     /// none.
-    pub(super) fn between(pairs: &[([f64; 3], [f64; 3])]) -> Self {
+    pub(crate) fn between(pairs: &[([f64; 3], [f64; 3])]) -> Self {
         if pairs.is_empty() {
             return Self::IDENTITY;
         }

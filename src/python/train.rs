@@ -32,6 +32,7 @@ pub(crate) fn plan(
     changes: Vec<String>,
 ) -> PyResult<Plan> {
     let options = MorphOptions {
+        align: "auto".to_owned(),
         pairs,
         preset,
         times,

@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::atomic::flush_folder;
 use crate::recipe::{Recipe, RecipeError};
-use crate::shape::{Bounds, Normalisation};
+use crate::shape::{Bounds, Coordinates, Normalisation, Placements};
 
 /// The layout of a checkpoint; raised when an older isomorph could not read it.
 pub(crate) const FORMAT_VERSION: u32 = 1;
@@ -50,12 +50,25 @@ pub(crate) struct State {
     pub backend: String,
     /// From the user's coordinates to the network's.
     pub normalisation: Normalisation,
+    /// Where shapes lie that were laid onto each other.
+    #[serde(default, skip_serializing_if = "Placements::is_empty")]
+    pub placements: Placements,
     /// The bounds of both shapes, normalised.
     pub bounds: Bounds,
     /// The whole recipe, resolved, as TOML.
     pub recipe: String,
     /// Size and checksum of the other files, by name.
     pub files: BTreeMap<String, FileDigest>,
+}
+
+impl State {
+    /// The way between the user's coordinates and those of the networks.
+    pub(crate) fn coordinates(&self) -> Coordinates {
+        Coordinates {
+            normalisation: self.normalisation,
+            placements: self.placements.clone(),
+        }
+    }
 }
 
 /// What a file must look like.

@@ -257,9 +257,9 @@ impl Bench<'_> {
         let keyframes = &prepared.keyframes;
         let name = format!("method {}", method.label);
         learned::check(recipe, &keyframes.normalisation).map_err(|error| error.within(&name))?;
-        let [source, target] = [0, 1].map(|k| &keyframes.keys[k].cloud.points);
+        let [source, target] = [0, 1].map(|k| keyframes.given_points(k));
         self.truth
-            .check_ends(truth.span, &keyframes.normalisation, source, target)?;
+            .check_ends(truth.span, &keyframes.normalisation, &source, &target)?;
         let ruler = Ruler {
             reference: &truth.reference,
             normalisation: truth.normalisation,

@@ -94,7 +94,7 @@ pub(super) fn make(
     }
     let clock = Instant::now();
     let frame = Frame {
-        normalisation: keyframes.normalisation,
+        coordinates: keyframes.coordinates(),
         bounds: keyframes.bounds,
     };
     let learned = learned::learned(learner.trainer().deformation(), recipe, frame)?;

@@ -65,7 +65,7 @@ impl Trained {
         let back = self.carry(&goals, last, first)?;
         let two = std::num::NonZeroUsize::MIN.saturating_add(1);
         let spacing = search.nearest_of_each(&goals, two);
-        let halves = self.learned().normalisation.invert_length(HALVES);
+        let halves = self.learned().coordinates.at(1.0).invert_length(HALVES);
         let pairs = found.iter().enumerate().map(|(k, near)| {
             let distance = near.squared_distance.sqrt();
             let round_trip = length(difference(back[k], source[k]));

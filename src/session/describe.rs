@@ -136,5 +136,12 @@ fn run_info(path: &Path) -> Result<String> {
     }
     let (centre, scale) = (state.normalisation.centre, state.normalisation.scale);
     writeln!(text, "normalised   (x - {centre:?}) * {scale}")?;
+    if !state.placements.is_empty() {
+        writeln!(
+            text,
+            "aligned      data.align = \"{}\": x lies in the first file; results lie where the files do",
+            recipe.data.align
+        )?;
+    }
     Ok(text)
 }

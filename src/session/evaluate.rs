@@ -65,15 +65,15 @@ impl Trained {
         let span = truth.span(from, to)?;
         let recipe = self.recipe();
         // Only the points are looked at: what corresponds to what plays no part.
-        let keyframes = prepare::points_only(recipe)?;
-        let [source, target] = &keyframes.keys[..] else {
+        let keyframes = prepare::points_only(recipe, &self.learned().coordinates)?;
+        if keyframes.keys.len() != 2 {
             let count = keyframes.keys.len();
             return Err(Error::usage(format!(
                 "the run has {count} key frames: name the frames that they are, with --keys"
             )));
-        };
-        let [source, target] = [source, target].map(|key| &key.cloud.points[..]);
-        truth.check_ends(span, &keyframes.normalisation, source, target)?;
+        }
+        let [source, target] = [0, 1].map(|k| keyframes.given_points(k));
+        truth.check_ends(span, &keyframes.normalisation, &source, &target)?;
         let normalisation = true_frame(truth, span)?;
         let reference = Reference::new(truth, span, &normalisation, options.of_reference())?;
         let ruler = Ruler {
@@ -104,7 +104,7 @@ impl Trained {
         mut on_event: impl FnMut(&Event),
     ) -> Result<KeysEvaluation> {
         let recipe = self.recipe();
-        let keyframes = prepare::points_only(recipe)?;
+        let keyframes = prepare::points_only(recipe, &self.learned().coordinates)?;
         if keys.len() != keyframes.keys.len() {
             return Err(Error::usage(format!(
                 "{} frames for the {} key frames of the run: give one for each",
@@ -178,23 +178,30 @@ impl Trained {
                 frames.push((frame, clock.unit(own)?));
             }
         }
-        let apply = |frame: usize| truth.normalised(frame, &learned.normalisation);
-        let start = apply(first);
+        let coordinates = &learned.coordinates;
+        let apply = |frame: usize, unit: f64| -> Vec<[f32; 3]> {
+            let place = coordinates.at(unit);
+            let vertices = truth.vertices(frame).iter();
+            vertices.map(|x| place.apply(*x)).collect()
+        };
+        let start = apply(first, 0.0);
         let units: Vec<f64> = frames.iter().map(|(_, unit)| *unit).collect();
         let path = learned.path(&start, &units)?;
         // From the units of the run to those in which everything else is measured.
-        let scale = normalisation.scale / learned.normalisation.scale;
-        let off = |a: &[[f32; 3]], b: &[[f32; 3]]| scale * mean_squared_error(a, b).sqrt();
+        let off = |a: &[[f32; 3]], b: &[[f32; 3]], unit: f64| {
+            let scale = normalisation.scale * coordinates.at(unit).invert_length(1.0);
+            scale * mean_squared_error(a, b).sqrt()
+        };
         let between: Vec<f64> = (frames.iter().zip(&path))
             .filter(|((frame, _), _)| !keys.contains(frame))
-            .map(|((frame, _), carried)| off(carried, &apply(*frame)))
+            .map(|((frame, unit), carried)| off(carried, &apply(*frame, *unit), *unit))
             .collect();
         let arrived = &path[path.len() - 1];
         let back = learned.carry(arrived, 1.0, 0.0)?;
         Ok(Some(Drift {
             mean: between.iter().sum::<f64>() / between.len() as f64,
-            last: off(arrived, &apply(last)),
-            there_and_back: off(&back, &start),
+            last: off(arrived, &apply(last, 1.0), 1.0),
+            there_and_back: off(&back, &start, 0.0),
         }))
     }
 }
@@ -212,9 +219,9 @@ pub(super) fn true_spans(
         .windows(2)
         .map(|two| truth.span(two[0], two[1]))
         .collect::<std::result::Result<_, _>>()?;
-    for (span, two) in spans.iter().zip(keyframes.keys.windows(2)) {
-        let [source, target] = [&two[0], &two[1]].map(|key| &key.cloud.points[..]);
-        truth.check_ends(*span, &keyframes.normalisation, source, target)?;
+    for (k, span) in spans.iter().enumerate() {
+        let [source, target] = [k, k + 1].map(|k| keyframes.given_points(k));
+        truth.check_ends(*span, &keyframes.normalisation, &source, &target)?;
     }
     Ok(spans)
 }

@@ -97,6 +97,7 @@ fn described(recipe: &Recipe, checkpoint: &Checkpoint, flow_steps: Option<usize>
         "flow_steps": flow_steps,
         "networks": networks,
         "normalisation": {"centre": state.normalisation.centre, "scale": state.normalisation.scale},
+        "placements": state.placements,
         "box": {"min": state.bounds.min, "max": state.bounds.max},
         "step": state.step,
     })

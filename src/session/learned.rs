@@ -10,14 +10,14 @@ use crate::error::{Error, Result};
 use crate::formats;
 use crate::geometry::{Bounds, Mesh};
 use crate::recipe::Recipe;
-use crate::shape::Normalisation;
+use crate::shape::{Coordinates, Normalisation};
 use crate::solved::Solved;
 use crate::surface::learned::Learned;
 
 /// The frame of the key frames: where the user's coordinates lie in the networks'.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Frame {
-    pub normalisation: Normalisation,
+    pub coordinates: Coordinates,
     pub bounds: Bounds,
 }
 
@@ -32,12 +32,12 @@ pub(super) fn learned(
 ) -> Result<Learned> {
     let template = match deformation.field() {
         Some(_) => None,
-        None => Some(template(recipe, &frame.normalisation)?),
+        None => Some(template(recipe, &frame.coordinates.normalisation)?),
     };
     Ok(Learned {
         deformation,
         template,
-        normalisation: frame.normalisation,
+        coordinates: frame.coordinates,
         bounds: frame.bounds.padded(recipe.training.box_margin as f32),
     })
 }
@@ -79,7 +79,7 @@ pub(super) fn load(
     let state = &checkpoint.state;
     let trainer = restored(checkpoint, recipe, engine)?;
     let frame = Frame {
-        normalisation: state.normalisation,
+        coordinates: state.coordinates(),
         bounds: state.bounds,
     };
     learned(trainer.deformation(), recipe, frame)

@@ -14,7 +14,7 @@ use super::self_test;
 use crate::event::{Event, StepReport, TermReport};
 use crate::memory;
 use crate::recipe::{Change, Recipe};
-use crate::shape::{Keyframes, Normalisation};
+use crate::shape::{Coordinates, Keyframes};
 use crate::solved::{Solved, guide};
 
 /// Why training stopped before its last step.
@@ -99,7 +99,7 @@ pub(crate) struct Learner {
     data: TrainingData,
     /// Points of each key frame, and known correspondences between them.
     given: (Vec<usize>, usize),
-    normalisation: Normalisation,
+    coordinates: Coordinates,
     trainer: Box<dyn Trainer>,
     backend: String,
     device: String,
@@ -168,7 +168,7 @@ impl Learner {
         };
         Ok(Self {
             trainer,
-            normalisation: keyframes.normalisation,
+            coordinates: keyframes.coordinates(),
             backend,
             device,
             given,
@@ -389,7 +389,8 @@ impl Learner {
             seconds: self.seconds,
             seed: self.recipe.training.seed,
             backend: self.backend.clone(),
-            normalisation: self.normalisation,
+            normalisation: self.coordinates.normalisation,
+            placements: self.coordinates.placements.clone(),
             bounds: self.data.bounds,
             recipe: self.recipe.to_toml(),
             files: Default::default(),
@@ -423,7 +424,7 @@ pub(crate) fn fits(
         let path = checkpoint.path.clone();
         return Err(LearnerError::OtherNetworks { path, change, why });
     }
-    if checkpoint.state.normalisation != keyframes.normalisation {
+    if checkpoint.state.coordinates() != keyframes.coordinates() {
         return Err(LearnerError::OtherShapes(checkpoint.path.clone()));
     }
     Ok(())

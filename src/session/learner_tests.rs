@@ -53,7 +53,8 @@ fn spheres() -> Keyframes {
         keys: keys.collect(),
         between: data.between,
         confidence: vec![Vec::new()],
-        normalisation: Normalisation {
+        placements: Default::default(),
+        normalisation: crate::shape::Normalisation {
             centre: [0.0; 3],
             scale: 1.0,
         },

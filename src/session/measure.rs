@@ -108,23 +108,30 @@ impl<'a> Measured<'a> {
     }
 
     /// From the method's coordinates to those of the truth.
-    fn measured(&self, points: Vec<[f32; 3]>) -> Vec<[f32; 3]> {
-        between(&self.learned.normalisation, &self.truth, points)
+    fn measured(&self, points: Vec<[f32; 3]>, time: f64) -> Vec<[f32; 3]> {
+        if self.is_frame_of_truth() {
+            return points;
+        }
+        let place = self.learned.coordinates.at(self.of_run(time));
+        let measured = |x| self.truth.apply(place.invert(x));
+        points.into_iter().map(measured).collect()
     }
 
     /// From the coordinates of the truth to the method's.
-    fn learnt(&self, points: &[[f32; 3]]) -> Vec<[f32; 3]> {
-        between(&self.truth, &self.learned.normalisation, points.to_vec())
+    fn learnt(&self, points: &[[f32; 3]], time: f64) -> Vec<[f32; 3]> {
+        if self.is_frame_of_truth() {
+            return points.to_vec();
+        }
+        let place = self.learned.coordinates.at(self.of_run(time));
+        let learnt = |x: &[f32; 3]| place.apply(self.truth.invert(*x));
+        points.iter().map(learnt).collect()
     }
-}
 
-/// Points of one frame in another.
-fn between(from: &Normalisation, to: &Normalisation, points: Vec<[f32; 3]>) -> Vec<[f32; 3]> {
-    if from == to {
-        return points;
+    /// Whether the method's coordinates are those of the truth at all times.
+    fn is_frame_of_truth(&self) -> bool {
+        let coordinates = &self.learned.coordinates;
+        coordinates.placements.is_empty() && coordinates.normalisation == self.truth
     }
-    let points = points.into_iter();
-    points.map(|point| to.apply(from.invert(point))).collect()
 }
 
 impl Candidate for Measured<'_> {
@@ -142,7 +149,7 @@ impl Candidate for Measured<'_> {
             Purpose::Measured => self.extracted(&self.fine, time)?,
         };
         let measured = |mesh: Mesh<f32>| {
-            let vertices = self.measured(mesh.vertices);
+            let vertices = self.measured(mesh.vertices, time);
             Mesh::of_points(&vertices, &mesh.triangles)
         };
         Ok(mesh.map(measured))
@@ -156,16 +163,19 @@ impl Candidate for Measured<'_> {
         if self.learned.deformation.motion().is_none() {
             return Ok(None);
         }
-        let times: Vec<f64> = times.iter().map(|time| self.of_run(*time)).collect();
-        let start = self.learnt(start);
-        let path = self.learned.path_from(&start, self.within[0], &times)?;
-        Ok(Some(path.into_iter().map(|at| self.measured(at)).collect()))
+        let of_run: Vec<f64> = times.iter().map(|time| self.of_run(*time)).collect();
+        let start = self.learnt(start, 0.0);
+        let path = self.learned.path_from(&start, self.within[0], &of_run)?;
+        let path = path.into_iter().zip(times);
+        Ok(Some(
+            path.map(|(at, time)| self.measured(at, *time)).collect(),
+        ))
     }
 
     fn slope_error(&mut self, points: &[[f32; 3]], time: f64) -> Result<Option<f64>, FramesError> {
         Ok(self
             .learned
-            .slope_error(&self.learnt(points), self.of_run(time)))
+            .slope_error(&self.learnt(points, time), self.of_run(time)))
     }
 }
 
@@ -276,7 +286,7 @@ mod tests {
             learned: &learned,
             smallest: 0.0,
             within: [0.0, 1.0],
-            truth: learned.normalisation,
+            truth: learned.coordinates.normalisation,
             fine: grid(64).expect("a good grid"),
             coarse: grid(COARSE).expect("a good grid"),
             anchor: None,

@@ -25,6 +25,7 @@
 //! | `stop.rs` | a flag that ends the work early |
 
 mod against_input;
+mod align;
 pub(crate) mod bench;
 pub(crate) mod bench_run;
 pub(crate) mod checkpoint;

@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::event::Event;
 use crate::formats::Shape;
 use crate::geometry::EdgeSharing;
-use crate::recipe::Recipe;
+use crate::recipe::{Align, Recipe};
 use crate::shape::CleanOptions;
 
 /// What is asked for beyond the files.
@@ -18,6 +18,8 @@ pub struct MorphOptions {
     pub pairs: Option<String>,
     /// The preset.
     pub preset: String,
+    /// How the files are laid onto each other: a value of `data.align`.
+    pub align: String,
     /// The times of the files; 0, 1, 2 and so on without it.
     pub times: Option<Vec<f64>>,
     /// Surfaces at even times.
@@ -76,15 +78,7 @@ pub fn plan_morph(files: &[PathBuf], options: &MorphOptions) -> Result<MorphPlan
         sizes.join(" and ")
     ));
     let apart = extents.windows(2).map(|two| two[0].apart(&two[1]));
-    assumed.push(match &apart.collect::<Vec<_>>()[..] {
-        [apart] => format!(
-            "frame: both files are in the same coordinates; their centres are {apart} apart"
-        ),
-        apart => format!(
-            "frame: all files are in the same coordinates; the centres of neighbours are {} apart",
-            apart.join(", ")
-        ),
-    });
+    assumed.push(frame(&apart.collect::<Vec<_>>(), recipe.data.align));
     assumed.push(match (chosen, pairs) {
         ("same-vertices", None) => {
             let all = if files.len() == 2 { "both" } else { "all" };
@@ -103,12 +97,37 @@ pub fn plan_morph(files: &[PathBuf], options: &MorphOptions) -> Result<MorphPlan
         ));
     }
     assumed.push(format!("preset: {}", options.preset));
+    // What is laid onto each other has neither other units nor another place.
     let doubts = extents.windows(2).flat_map(|two| two[0].doubts(&two[1]));
+    let doubts = match recipe.data.align {
+        Align::None | Align::Rigid => doubts.collect(),
+        Align::Similarity | Align::Auto => Vec::new(),
+    };
     Ok(MorphPlan {
         recipe,
         assumed,
-        doubts: doubts.collect(),
+        doubts,
     })
+}
+
+/// What is taken for granted of the files' coordinates; the distances of the centres of neighbours are given.
+fn frame(apart: &[String], align: Align) -> String {
+    let files = if apart.len() == 1 { "both" } else { "all" };
+    let how = match align {
+        Align::None => format!("{files} files are in the same coordinates"),
+        Align::Rigid => format!("{files} files are turned and shifted onto each other"),
+        Align::Similarity => format!("{files} files are turned, shifted and sized onto each other"),
+        Align::Auto => format!(
+            "{files} files are in the same coordinates, unless size, place or a large turn speak against it"
+        ),
+    };
+    match apart {
+        [apart] => format!("frame: {how}; their centres are {apart} apart"),
+        apart => format!(
+            "frame: {how}; the centres of neighbours are {} apart",
+            apart.join(", ")
+        ),
+    }
 }
 
 /// The recipe with these pairs, before it is changed.
@@ -116,6 +135,7 @@ fn planned(files: &[PathBuf], options: &MorphOptions, pairs: &str) -> Result<Rec
     let set = [
         format!("preset={}", options.preset),
         format!("data.correspondences={pairs}"),
+        format!("data.align={}", options.align),
         format!("result.frames={}", options.frames),
     ];
     let mut recipe = match (files, &options.times) {

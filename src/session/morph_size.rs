@@ -43,8 +43,7 @@ impl Size {
                 "one shape is {} times as large as the other",
                 significant(large / small)
             );
-            let cure =
-                "if their units differ, such as metres and millimetres, bring both to one unit";
+            let cure = "if their units differ, such as metres and millimetres, add --align auto";
             doubts.push(Doubt::new(finding, cure));
         }
         let apart = length(difference(self.centre(), other.centre()));
@@ -53,7 +52,7 @@ impl Size {
                 "the centres of the shapes are {} apart, more than their size",
                 significant(apart)
             );
-            let cure = "the motion will contain this way; lay one shape over the other first if it should not";
+            let cure = "the motion will contain this way; add --align auto if it should not";
             doubts.push(Doubt::new(finding, cure));
         }
         doubts

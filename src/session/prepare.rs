@@ -5,6 +5,7 @@ use std::path::Path;
 
 use isomorph_training::method::spline::is_solved;
 
+use super::align::{Aligned, aligned};
 use crate::error::Result;
 use crate::event::{Event, Preparation};
 use crate::formats::{self, Sequence, Shape};
@@ -12,7 +13,8 @@ use crate::matching::{MatchOptions, Matching, match_shapes};
 use crate::recipe::{self, Recipe};
 use crate::session::folder::RunFolder;
 use crate::shape::{
-    self, CleanOptions, CorrespondenceSource, Correspondences, DataOptions, Keyframes, NormalSource,
+    self, CleanOptions, Coordinates, CorrespondenceSource, Correspondences, DataOptions, Keyframes,
+    NormalSource, Placements,
 };
 
 /// Shapes ready for training.
@@ -78,6 +80,12 @@ pub(super) fn prepare(
     stored: Option<&RunFolder>,
     emit: &mut dyn FnMut(&Event),
 ) -> Result<Prepared> {
+    let Aligned {
+        shapes,
+        to_files,
+        notes,
+    } = aligned(recipe, shapes)?;
+    let shapes = &shapes[..];
     let intervals = recipe.data.between.len();
     let mut between = Vec::with_capacity(intervals);
     let mut found = BTreeMap::new();
@@ -96,7 +104,13 @@ pub(super) fn prepare(
         });
     }
     emit(&Event::Preparing(Preparation::Points));
-    let keyframes = shape::prepare(shapes, &options(recipe, between))?;
+    let options = options(recipe, between);
+    let mut keyframes = shape::prepare(shapes, &options)?;
+    if !to_files.is_empty() {
+        let centre = keyframes.normalisation.centre;
+        keyframes.placements = Placements::new(&to_files, &options.times, centre);
+    }
+    keyframes.notes.extend(notes);
     if is_solved(recipe) {
         emit(&Event::Preparing(Preparation::Distances));
     }
@@ -135,15 +149,23 @@ fn matched(
     Ok((found.correspondences(), Some(found)))
 }
 
-/// Makes the shapes of a recipe ready where only their points count: no pairs are read or found.
+/// Makes the shapes of a recipe ready where only their points count: no pairs are read or found. They lie on each other
+/// as they did in training.
 ///
 /// # Errors
 /// What [`shape::prepare`] refuses.
-pub(super) fn points_only(recipe: &Recipe) -> Result<Keyframes> {
-    let shapes = read(recipe)?;
+pub(super) fn points_only(recipe: &Recipe, coordinates: &Coordinates) -> Result<Keyframes> {
     let unknown = recipe.data.between.iter();
     let unknown = unknown.map(|_| CorrespondenceSource::None).collect();
-    Ok(shape::prepare(&shapes, &options(recipe, unknown))?)
+    let options = options(recipe, unknown);
+    let shapes = read(recipe)?.into_iter().zip(&options.times);
+    let laid = shapes.map(|(shape, time)| match coordinates.at(*time).to_file {
+        Some(to_file) => shape.laid_by(&to_file.inverse()),
+        None => shape,
+    });
+    let mut keyframes = shape::prepare(&laid.collect::<Vec<_>>(), &options)?;
+    keyframes.placements = coordinates.placements.clone();
+    Ok(keyframes)
 }
 
 /// What a recipe says of its shapes.

@@ -110,9 +110,11 @@ impl Trained {
         let entries: Vec<FrameEntry> = serde_json::from_str(&text).ok()?;
         let frames = entries.into_iter().map(|entry| {
             let shape = formats::read(&folder.join(&entry.surface)).ok()?;
-            let mesh = shape.mesh.moved(|x| self.learned().normalisation.apply(x));
+            let time = self.clock().unit(entry.time).ok()?;
+            let place = self.learned().coordinates.at(time);
+            let mesh = shape.mesh.moved(|x| place.apply(x));
             Some(Frame {
-                time: self.clock().unit(entry.time).ok()?,
+                time,
                 entry,
                 components: mesh.components().len(),
                 mesh,

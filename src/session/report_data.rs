@@ -76,6 +76,10 @@ impl<'a> ReportData<'a> {
             notes: notes_of(trained),
             thinned: Vec::new(),
         };
+        if !trained.learned().coordinates.placements.is_empty() {
+            let text = "this page shows the shapes as they lie on each other, in the coordinates of the first file";
+            data.notes.push(text.to_owned());
+        }
         data.add_ends()?;
         frames.sort_by(|a, b| a.time.total_cmp(&b.time));
         data.add_surfaces(&frames, truth)?;
@@ -95,7 +99,9 @@ impl<'a> ReportData<'a> {
     fn add_ends(&mut self) -> Result<()> {
         let last = self.shapes.len() - 1;
         for (end, (k, word)) in [(0, "source"), (last, "target")].into_iter().enumerate() {
-            let mesh = self.normalised(&self.shapes[k]);
+            let time = if k == 0 { 0.0 } else { 1.0 };
+            let place = self.learned().coordinates.at(time);
+            let mesh = self.shapes[k].mesh.moved(|x| place.apply(x));
             let count = mesh.vertices.len();
             let Thinned { mesh, chosen } = shown(&mesh);
             if chosen.len() < count {
@@ -104,11 +110,7 @@ impl<'a> ReportData<'a> {
             }
             if end == 0 && self.moves() {
                 let start: Vec<[f32; 3]> = (chosen.iter())
-                    .map(|k| {
-                        self.learned()
-                            .normalisation
-                            .apply(self.shapes[0].mesh.vertices[*k as usize])
-                    })
+                    .map(|k| place.apply(self.shapes[0].mesh.vertices[*k as usize]))
                     .collect();
                 let intervals = self.shapes.len() - 1;
                 let times =
@@ -124,11 +126,6 @@ impl<'a> ReportData<'a> {
             self.ends[end].mesh = mesh;
         }
         Ok(())
-    }
-
-    fn normalised(&self, shape: &Shape) -> Mesh<f32> {
-        let frame = &self.learned().normalisation;
-        shape.mesh.moved(|x| frame.apply(x))
     }
 
     /// The surfaces, each moved by the motion to half-way to the next.
@@ -249,7 +246,7 @@ impl<'a> ReportData<'a> {
         };
         match found {
             Some(Ok(known)) => {
-                let frame = &self.learned().normalisation;
+                let places = [0.0, 1.0].map(|time| self.learned().coordinates.at(time));
                 let some = thinned_cloud(known.pairs.len(), PAIRS);
                 if some.len() < known.pairs.len() {
                     let text = format!("{} of {} pairs", some.len(), known.pairs.len());
@@ -257,7 +254,10 @@ impl<'a> ReportData<'a> {
                 }
                 let both = |k: u32| {
                     let [a, b] = known.pairs[k as usize].map(|vertex| vertex as usize);
-                    [source.mesh.vertices[a], target.mesh.vertices[b]].map(|x| frame.apply(x))
+                    [
+                        places[0].apply(source.mesh.vertices[a]),
+                        places[1].apply(target.mesh.vertices[b]),
+                    ]
                 };
                 self.pairs = some.into_iter().map(both).collect();
             }
@@ -297,7 +297,7 @@ impl<'a> ReportData<'a> {
             title,
             subtitle,
             date: date.replace('T', " ").replace('Z', " UTC"),
-            unit: 1.0 / trained.learned().normalisation.scale,
+            unit: 1.0 / trained.learned().coordinates.normalisation.scale,
             clock: trained.span(),
             keys: trained.key_units(),
             bounds: bounds.found(),

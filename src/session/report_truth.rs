@@ -23,7 +23,7 @@ impl<'a> TrueShapes<'a> {
         [from, to]: [usize; 2],
     ) -> Result<Self> {
         let span = truth.span(from, to)?;
-        let keyframes = prepare::points_only(trained.recipe())?;
+        let keyframes = prepare::points_only(trained.recipe(), &trained.learned().coordinates)?;
         // Key frames in between must be where their times say: the shapes at other times follow from that.
         let frames = keyframes.keys.iter().map(|key| {
             let at = from as f64 + key.time * (to - from) as f64;
@@ -54,9 +54,10 @@ impl<'a> TrueShapes<'a> {
         let before = (at.floor() as usize).min(to - 1);
         let share = at - before as f64;
         let [a, b] = [before, before + 1].map(|frame| self.truth.vertices(frame));
+        let place = learned.coordinates.at(time);
         let between = |(a, b): (&[f64; 3], &[f64; 3])| {
             let x = [0, 1, 2].map(|k| a[k] + share * (b[k] - a[k]));
-            learned.normalisation.apply(x)
+            place.apply(x)
         };
         let vertices = a.iter().zip(b).map(between).collect();
         let mesh: Mesh<f32> = Mesh::new(vertices, self.truth.triangles().to_vec());

@@ -26,7 +26,7 @@ pub struct FieldGrid {
     pub has_velocity: bool,
 }
 
-/// Numbers at places at a time, normalised.
+/// Numbers at normalised places at a time, in the coordinates of the shapes.
 type Values<'a> = dyn Fn(&[[f32; 3]], f64) -> Vec<f32> + 'a;
 
 impl Trained {
@@ -60,7 +60,7 @@ impl Trained {
             Error::usage(text)
         })?;
         let motion = learned.deformation.motion();
-        let axes = self.axes(nodes)?;
+        let axes = self.axes(nodes, &units)?;
         let counts = axes.each_ref().map(Vec::len);
         let count: usize = counts.iter().product();
         if count.saturating_mul(times.len()) > MOST_NODES {
@@ -70,14 +70,12 @@ impl Trained {
                 times.len()
             )));
         }
-        let places = self.places(&axes);
         let all = count * times.len() * if motion.is_some() { 2 } else { 1 };
         let mut done = 0;
-        let own = |value: f32| learned.normalisation.invert_length(f64::from(value)) as f32;
         let mut each = |out: &mut dyn Write, values: &Values<'_>| {
             for &time in &units {
-                for chunk in places.chunks(AT_A_TIME) {
-                    let found = values(chunk, time).into_iter().map(own);
+                for chunk in self.places(&axes, time).chunks(AT_A_TIME) {
+                    let found = values(chunk, time).into_iter();
                     let bytes: Vec<u8> = found.flat_map(f32::to_le_bytes).collect();
                     out.write_all(&bytes)?;
                     done += chunk.len();
@@ -96,7 +94,11 @@ impl Trained {
                 archive.write_all(&bytes(axis))?;
             }
             array(&mut archive, "f", "<f4", &[times.len(), nx, ny, nz])?;
-            each(&mut archive, &|points, time| field.values(points, time))?;
+            each(&mut archive, &|points, time| {
+                let place = learned.coordinates.at(time);
+                let own = |value: f32| place.invert_length(f64::from(value)) as f32;
+                field.values(points, time).into_iter().map(own).collect()
+            })?;
             if let Some(motion) = motion {
                 array(
                     &mut archive,
@@ -105,10 +107,10 @@ impl Trained {
                     &[times.len(), nx, ny, nz, 3],
                 )?;
                 each(&mut archive, &|points, time| {
-                    let mut found = motion.velocities(points, time).into_flattened();
-                    let length = clock.length() as f32;
-                    found.iter_mut().for_each(|part| *part /= length);
-                    found
+                    let found = motion.velocities(points, time);
+                    let found = learned.coordinates.velocities(time, points, &found);
+                    let parts = found.into_flattened().into_iter();
+                    parts.map(|part| (part / clock.length()) as f32).collect()
                 })?;
             }
             archive.finish()?;
@@ -121,26 +123,34 @@ impl Trained {
         })
     }
 
-    /// The nodes, normalised, those along z following one another.
-    fn places(&self, [x, y, z]: &[Vec<f64>; 3]) -> Vec<[f32; 3]> {
-        let frame = &self.learned().normalisation;
+    /// The nodes, normalised at a time, those along z following one another.
+    fn places(&self, [x, y, z]: &[Vec<f64>; 3], time: f64) -> Vec<[f32; 3]> {
+        let place = self.learned().coordinates.at(time);
         let mut places = Vec::with_capacity(x.len() * y.len() * z.len());
         for &x in x {
             for &y in y {
-                places.extend(z.iter().map(|&z| frame.apply([x, y, z])));
+                places.extend(z.iter().map(|&z| place.apply([x, y, z])));
             }
         }
         places
     }
 
-    /// The coordinates of the nodes along each axis of the box.
-    fn axes(&self, nodes: usize) -> Result<[Vec<f64>; 3]> {
+    /// The coordinates of the nodes along each axis of the box, or of the box round those of all times.
+    fn axes(&self, nodes: usize, times: &[f64]) -> Result<[Vec<f64>; 3]> {
         if nodes < 2 {
             return Err(Error::usage(format!("{nodes} nodes: must be 2 or more")));
         }
         let learned = self.learned();
-        let low = learned.normalisation.invert(learned.bounds.min);
-        let high = learned.normalisation.invert(learned.bounds.max);
+        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        let some = if times.is_empty() { &[0.0] } else { times };
+        for &time in some {
+            let place = learned.coordinates.at(time);
+            for corner in learned.bounds.corners() {
+                let x = place.invert(corner);
+                low = [0, 1, 2].map(|axis| low[axis].min(x[axis]));
+                high = [0, 1, 2].map(|axis| high[axis].max(x[axis]));
+            }
+        }
         let longest = (0..3)
             .map(|axis| high[axis] - low[axis])
             .fold(0.0, f64::max);

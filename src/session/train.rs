@@ -230,7 +230,7 @@ impl Session {
             )));
         }
         let deformation = begun.learner.trainer().deformation();
-        let learned = learned::learned(deformation, &self.recipe, begun.frame)?;
+        let learned = learned::learned(deformation, &self.recipe, begun.frame.clone())?;
         let trained = Trained::new(learned, self.recipe.clone(), begun.run);
         if self.recipe.result.frames > 0 {
             let Output { format, carry } = self.output;
@@ -272,9 +272,9 @@ impl Session {
             on_event(&event);
             log.record(&event)
         };
-        let (recipe, frame) = (&self.recipe, begun.frame);
+        let (recipe, frame) = (&self.recipe, &begun.frame);
         let mut preview = |trainer: &dyn Trainer| -> std::result::Result<(), String> {
-            let learned = learned::learned(trainer.deformation(), recipe, frame);
+            let learned = learned::learned(trainer.deformation(), recipe, frame.clone());
             let shown = learned
                 .and_then(|learned| Trained::new(learned, recipe.clone(), run.clone()).preview());
             shown.map_err(|error| error.to_string())
@@ -425,7 +425,7 @@ impl Begun {
             learner,
             ends: End::all(&keyframes.keys),
             frame: Frame {
-                normalisation: keyframes.normalisation,
+                coordinates: keyframes.coordinates(),
                 bounds: keyframes.bounds,
             },
         }

@@ -13,7 +13,7 @@ use crate::cubes::Grid;
 use crate::error::{Error, Result};
 use crate::geometry::Mesh;
 use crate::recipe::Recipe;
-use crate::shape::Normalisation;
+use crate::shape::Place;
 use crate::surface::learned::Learned;
 
 /// A trained run. Everything goes in and comes out in the coordinates of its shapes.
@@ -196,8 +196,9 @@ impl Trained {
             &mut progress,
         )?;
         let (normals, _) = learned.normals(&found.mesh, unit);
-        let mut mesh = found.mesh.moved(|x| learned.normalisation.invert(x));
-        mesh.normals = Some(normals);
+        let place = learned.coordinates.at(unit);
+        let mut mesh = found.mesh.moved(|x| place.invert(x));
+        mesh.normals = Some(place.invert_normals(normals));
         Ok(Surface {
             time: t,
             mesh,
@@ -228,14 +229,14 @@ impl Trained {
     ) -> Result<Vec<[f64; 3]>> {
         let from = self.clock().unit(from)?;
         let to = self.clock().unit(to)?;
-        let frame = &self.learned.normalisation;
+        let [there, goal] = [from, to].map(|unit| self.learned.coordinates.at(unit));
         let mut moved = Vec::with_capacity(points.len());
         for chunk in points.chunks(CARRIED_AT_A_TIME) {
-            let start = normalised(frame, chunk);
+            let start = normalised(&there, chunk);
             let end = self.learned.carry(&start, from, to)?;
             moved.extend(
                 (chunk.iter().zip(start.iter().zip(&end)))
-                    .map(|(x, (start, end))| frame.displaced(*x, *start, *end)),
+                    .map(|(x, (start, end))| there.displaced(*x, [*start, *end], &goal)),
             );
             progress(moved.len());
         }
@@ -249,11 +250,12 @@ impl Trained {
     pub fn velocity(&self, points: &[[f64; 3]], t: f64) -> Result<Vec<[f64; 3]>> {
         let clock = self.clock();
         let unit = clock.unit(t)?;
-        let frame = &self.learned.normalisation;
-        let motion = self.learned.motion()?;
-        let found = motion.velocities(&normalised(frame, points), unit);
+        let coordinates = &self.learned.coordinates;
+        let points = normalised(&coordinates.at(unit), points);
+        let found = self.learned.motion()?.velocities(&points, unit);
+        let found = coordinates.velocities(unit, &points, &found);
         let length = clock.length();
-        let own = |v: [f32; 3]| v.map(|part| frame.invert_length(f64::from(part)) / length);
+        let own = |v: [f64; 3]| v.map(|part| part / length);
         Ok(found.into_iter().map(own).collect())
     }
 
@@ -269,19 +271,21 @@ impl Trained {
                 self.recipe.method.name
             ))
         })?;
-        let frame = &self.learned.normalisation;
-        let points = normalised(frame, points);
+        let place = self.learned.coordinates.at(unit);
+        let points = normalised(&place, points);
         let values = field.values(&points, unit).into_iter();
         let gradients = field.gradients(&points, unit).into_iter();
         Ok(Distances {
             distances: values
-                .map(|value| frame.invert_length(f64::from(value)))
+                .map(|value| place.invert_length(f64::from(value)))
                 .collect(),
-            gradients: gradients.map(|g| g.map(f64::from)).collect(),
+            gradients: gradients
+                .map(|g| place.invert_direction(g).map(f64::from))
+                .collect(),
         })
     }
 }
 
-fn normalised(frame: &Normalisation, points: &[[f64; 3]]) -> Vec<[f32; 3]> {
-    points.iter().map(|x| frame.apply(*x)).collect()
+fn normalised(place: &Place, points: &[[f64; 3]]) -> Vec<[f32; 3]> {
+    points.iter().map(|x| place.apply(*x)).collect()
 }

@@ -48,7 +48,7 @@ impl Trained {
         let ways: Vec<f64> = ways.map(|(a, b)| length(difference(*b, *a))).collect();
         let report = Warped {
             points: start.len(),
-            outside: start.iter().filter(|x| !self.has_learned_at(**x)).count(),
+            outside: self.outside(start, from)?,
             mean: ways.iter().sum::<f64>() / ways.len().max(1) as f64,
             longest: ways.into_iter().fold(0.0, f64::max),
         };
@@ -75,10 +75,17 @@ impl Trained {
         Ok(report)
     }
 
-    /// Whether a place lies in the box in which the motion was learned.
-    fn has_learned_at(&self, x: [f64; 3]) -> bool {
+    /// How many places lie outside the box in which the motion was learned, at a time.
+    fn outside(&self, places: &[[f64; 3]], time: f64) -> Result<usize> {
         let learned = self.learned();
-        let (x, bounds) = (learned.normalisation.apply(x), &learned.bounds);
-        (0..3).all(|axis| bounds.min[axis] <= x[axis] && x[axis] <= bounds.max[axis])
+        let (place, bounds) = (
+            learned.coordinates.at(self.clock().unit(time)?),
+            &learned.bounds,
+        );
+        let is_inside = |x: &&[f64; 3]| {
+            let x = place.apply(**x);
+            (0..3).all(|axis| bounds.min[axis] <= x[axis] && x[axis] <= bounds.max[axis])
+        };
+        Ok(places.len() - places.iter().filter(is_inside).count())
     }
 }

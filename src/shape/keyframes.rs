@@ -14,6 +14,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::border;
+use super::coordinates::{Coordinates, Placements};
 use super::correspond::Correspondences;
 use super::distance::SignedDistance;
 use super::mismatch;
@@ -98,6 +99,8 @@ pub struct Keyframes {
     pub confidence: Vec<Vec<f32>>,
     /// The way between the user's coordinates and these.
     pub normalisation: Normalisation,
+    /// Where the shapes lie if they were laid onto each other.
+    pub(crate) placements: Placements,
     /// The box around all of them, normalised.
     pub bounds: Bounds,
     /// What was decided about the data, one sentence each.
@@ -108,6 +111,29 @@ impl Keyframes {
     /// How many correspondences are known in all.
     pub fn pair_count(&self) -> usize {
         self.between.iter().map(Vec::len).sum()
+    }
+
+    /// The way between the user's coordinates and those of the points, at any time.
+    pub(crate) fn coordinates(&self) -> Coordinates {
+        Coordinates {
+            normalisation: self.normalisation,
+            placements: self.placements.clone(),
+        }
+    }
+
+    /// The points of a key frame where its file has them, normalised as if nothing were laid onto anything.
+    pub(crate) fn given_points(&self, k: usize) -> Cow<'_, [[f32; 3]]> {
+        let key = &self.keys[k];
+        if self.placements.is_empty() {
+            return Cow::Borrowed(&key.cloud.points);
+        }
+        let place = self.coordinates().at(key.time);
+        let given = key.cloud.points.iter();
+        Cow::Owned(
+            given
+                .map(|x| self.normalisation.apply(place.invert(*x)))
+                .collect(),
+        )
     }
 
     /// The points as methods sample them.
@@ -266,6 +292,7 @@ pub(crate) fn prepare(shapes: &[Shape], options: &DataOptions) -> Result<Keyfram
         between,
         confidence,
         normalisation,
+        placements: Placements::default(),
         notes,
     })
 }

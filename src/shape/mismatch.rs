@@ -40,9 +40,9 @@ pub(super) fn sizes([source, target]: [&Shape; 2], areas: [f64; 2]) -> Option<St
         .find(|unit| factor < **unit * NEAR && factor > **unit / NEAR);
     let why = match unit {
         Some(unit) => format!(
-            "this is near {unit}, as between two units of length; if it is one, scale a file"
+            "this is near {unit}, as between two units of length; if it is one, set data.align = \"auto\""
         ),
-        None => "if this is not meant, scale a file".to_owned(),
+        None => "if this is not meant, set data.align = \"auto\"".to_owned(),
     };
     Some(format!(
         "{name} is {factor:.1} times {which} in length than {}: {why}",
@@ -173,7 +173,7 @@ pub(super) fn distance([source, target]: [&Shape; 2]) -> Option<String> {
     let gap = one.gap(&other);
     (gap > largest).then(|| {
         format!(
-            "{} and {} are {:.1} times their size apart: the motion goes all the way; if it is not meant, move a file",
+            "{} and {} are {:.1} times their size apart: the motion goes all the way; if it is not meant, set data.align = \"auto\"",
             source.path.display(),
             target.path.display(),
             gap / largest
@@ -214,7 +214,7 @@ mod tests {
         assert!(
             said(5.0)
                 .expect("said")
-                .ends_with("if this is not meant, scale a file")
+                .ends_with("if this is not meant, set data.align = \"auto\"")
         );
     }
 

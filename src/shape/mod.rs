@@ -16,6 +16,7 @@
 //! | `correspond.rs` | pairs of vertices that are known to correspond |
 //! | `pairs_file.rs` | files of them |
 //! | `normalise.rs` | the joint frame in which the networks work, and the way back |
+//! | `coordinates.rs` | the same where shapes were laid onto each other, at any time |
 //! | `points.rs` | the points, normals and closed mesh of one shape |
 //! | `keyframes.rs` | all of it in order: shapes in, [`Keyframes`] ready for training out |
 //!
@@ -26,6 +27,7 @@
 
 mod border;
 mod clean;
+mod coordinates;
 mod correspond;
 mod distance;
 mod exposed;
@@ -44,6 +46,7 @@ mod solid;
 pub(crate) use crate::formats::{FEWEST_POINTS, Shape, ShapeError};
 pub(crate) use crate::geometry::{Bounds, NeighbourSearch};
 pub use clean::CleanOptions;
+pub(crate) use coordinates::{Coordinates, Place, Placements};
 pub(crate) use correspond::Correspondences;
 pub(crate) use keyframes::key_name;
 pub(crate) use keyframes::{CorrespondenceSource, DataOptions, prepare, wound_outwards};

@@ -31,6 +31,7 @@ fn keyframes(angle: f32) -> Keyframes {
         between: vec![pairs.collect()],
         confidence: vec![Vec::new()],
         keys: vec![key(0.0, &first), key(1.0, &last)],
+        placements: Default::default(),
         normalisation: Normalisation {
             centre: [0.0; 3],
             scale: 1.0,

@@ -246,7 +246,9 @@ fn write_frame(
     let found = learned.surface_at(grid, time, options.smallest_component, &mut |_| {})?;
     let mesh = &found.mesh;
     let (normals, slope_error) = learned.normals(mesh, time);
-    let mut placed = mesh.moved(|x| learned.normalisation.invert(x));
+    let place = learned.coordinates.at(time);
+    let normals = place.invert_normals(normals);
+    let mut placed = mesh.moved(|x| place.invert(x));
     let map = match options.trust {
         true => TrustMap::of(learned, mesh, time)?,
         false => None,
@@ -323,18 +325,20 @@ pub(crate) fn carried_vertices(
     times: &[f64],
 ) -> Result<Vec<Vec<[f64; 3]>>, FramesError> {
     let vertices = &shape.mesh.vertices;
+    let there = learned.coordinates.at(from);
     // What has no place stays without: it is not moved.
     let place = |x: &[f64; 3]| match is_finite(x) {
-        true => learned.normalisation.apply(*x),
+        true => there.apply(*x),
         false => [0.0; 3],
     };
     let start: Vec<[f32; 3]> = vertices.iter().map(place).collect();
     let path = learned.path_from(&start, from, times)?;
     // The displacement is added to the vertex as it was read, so that time 0 gives the input back.
-    let placed = |now: Vec<[f32; 3]>| {
-        (vertices.iter().zip(&start).zip(&now))
-            .map(|((vertex, start), now)| learned.normalisation.displaced(*vertex, *start, *now))
+    let placed = |(now, time): (Vec<[f32; 3]>, &f64)| {
+        let place = learned.coordinates.at(*time);
+        (vertices.iter().zip(start.iter().zip(&now)))
+            .map(|(vertex, (start, now))| there.displaced(*vertex, [*start, *now], &place))
             .collect()
     };
-    Ok(path.into_iter().map(placed).collect())
+    Ok(path.into_iter().zip(times).map(placed).collect())
 }

@@ -35,8 +35,9 @@ pub(super) fn write_layers(
         let mesh = learned.layer_at(grid, time, offset, options.smallest_component)?;
         let surface = format!("layer-{k:03}-{number}.{}", format.extension());
         let (normals, _) = learned.normals(&mesh, time);
-        let mut placed = mesh.moved(|x| learned.normalisation.invert(x));
-        placed.normals = Some(normals);
+        let place = learned.coordinates.at(time);
+        let mut placed = mesh.moved(|x| place.invert(x));
+        placed.normals = Some(place.invert_normals(normals));
         write_surface(&placed, &options.folder.join(&surface), format)?;
         Ok(LayerEntry { offset, surface })
     };

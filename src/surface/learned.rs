@@ -8,7 +8,7 @@ use super::error::{FramesError, no_motion};
 use super::flow_map::{FlowMap, first_stride};
 use crate::cubes::{Extraction, Grid, extract};
 use crate::geometry::Mesh;
-use crate::shape::{Bounds, Normalisation};
+use crate::shape::{Bounds, Coordinates};
 
 /// The most vertices at which an interpolated flow is compared with the flow itself.
 const CHECKED: usize = 1000;
@@ -19,8 +19,8 @@ pub(crate) struct Learned {
     pub deformation: Box<dyn Deformation>,
     /// A mesh at time 0, normalised, that the motion carries: of methods that have no field.
     pub template: Option<Mesh<f32>>,
-    /// From the user's coordinates to the networks'.
-    pub normalisation: Normalisation,
+    /// The user's coordinates and the networks'.
+    pub coordinates: Coordinates,
     /// The box in which the surface is looked for, normalised.
     pub bounds: Bounds,
 }
@@ -84,7 +84,7 @@ impl Learned {
         smallest: f64,
     ) -> Result<Mesh<f32>, FramesError> {
         let field = self.deformation.field().ok_or(FramesError::NoField)?;
-        let level = (offset * self.normalisation.scale) as f32;
+        let level = self.coordinates.at(time).apply_length(offset) as f32;
         let off = |points: &[[f32; 3]]| {
             let mut values = field.values(points, time);
             values.iter_mut().for_each(|value| *value -= level);
@@ -271,6 +271,7 @@ pub(crate) fn some_of(points: &[[f32; 3]], most: usize) -> Vec<[f32; 3]> {
 #[cfg(test)]
 pub(crate) mod testing {
     use super::*;
+    use crate::shape::Normalisation;
 
     /// A field and a motion given by the test.
     pub(crate) struct Given<F, M> {
@@ -321,10 +322,10 @@ pub(crate) mod testing {
             Self {
                 deformation: Box::new(deformation),
                 template: None,
-                normalisation: Normalisation {
+                coordinates: Coordinates::as_given(Normalisation {
                     centre: [0.0; 3],
                     scale: 1.0,
-                },
+                }),
                 bounds: Bounds {
                     min: [-0.7; 3],
                     max: [0.7; 3],

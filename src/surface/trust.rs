@@ -43,8 +43,9 @@ impl TrustMap {
         time: f64,
     ) -> Result<Option<Self>, FramesError> {
         let found = learned.agreement_of_each(&mesh.vertices, time)?;
+        let place = learned.coordinates.at(time);
         let own = |values: Vec<f32>| -> Vec<f32> {
-            let length = |value: f32| learned.normalisation.invert_length(f64::from(value)) as f32;
+            let length = |value: f32| place.invert_length(f64::from(value)) as f32;
             values.into_iter().map(length).collect()
         };
         Ok(found.map(|found| Self {

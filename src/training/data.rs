@@ -39,6 +39,15 @@ impl Bounds {
         }
     }
 
+    /// The eight corners.
+    pub fn corners(&self) -> [[f32; 3]; 8] {
+        let side = |corner: usize, axis: usize| match corner >> axis & 1 {
+            0 => self.min[axis],
+            _ => self.max[axis],
+        };
+        std::array::from_fn(|corner| [0, 1, 2].map(|axis| side(corner, axis)))
+    }
+
     /// The box with this much more room on every side.
     #[must_use]
     pub fn padded(&self, margin: f32) -> Self {

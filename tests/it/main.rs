@@ -4,6 +4,7 @@
 #![allow(clippy::print_stdout, reason = "what was measured, for --nocapture")]
 #![allow(clippy::panic_in_result_fn, reason = "tests fail by panics")]
 
+mod aligned;
 mod backends;
 mod bad_comparisons;
 mod bad_methods;

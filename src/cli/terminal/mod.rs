@@ -6,6 +6,7 @@
 mod bar;
 mod pace;
 mod plain;
+mod verbose;
 
 use std::ffi::OsString;
 use std::io::{self, IsTerminal, Stderr, Write};
@@ -17,6 +18,7 @@ use isomorph::Event;
 use bar::Bar;
 use pace::Pace;
 use plain::PlainLines;
+use verbose::VerboseLines;
 
 /// Where the events of a run go.
 #[derive(Debug)]
@@ -27,6 +29,7 @@ enum View {
     Nothing,
     Json(Pace),
     Lines(PlainLines<Stderr>),
+    All(VerboseLines<Stderr>),
     Bar(Box<Bar<Stderr>>),
 }
 
@@ -43,6 +46,15 @@ impl Terminal {
             ))),
             false => View::Lines(PlainLines::new(io::stderr(), run.to_path_buf())),
         })
+    }
+
+    /// All events of the run in this folder, as lines.
+    pub(super) fn verbose(run: &Path) -> Self {
+        Self(View::All(VerboseLines::new(
+            io::stderr(),
+            run.to_path_buf(),
+            Instant::now(),
+        )))
     }
 
     /// Events as JSON on standard output.
@@ -65,6 +77,7 @@ impl Terminal {
                 let _ = io::stdout().write_all(format!("{value}\n").as_bytes());
             }
             View::Lines(lines) => lines.show(event, now),
+            View::All(lines) => lines.show(event, now),
             View::Bar(bar) => bar.show(event, now),
         }
     }

@@ -22,7 +22,7 @@ use super::keys::DataKeys;
 use super::rule::{Rule, Value};
 use super::schema::{Key, Keyed};
 use super::setting::Setting;
-use super::words::{Cleaning, Correspondences, NormalSource};
+use super::words::{Align, Cleaning, Correspondences, NormalSource};
 
 /// The key frames and how they become points.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,6 +43,8 @@ pub struct DataRecipe {
     pub clean_strays: f64,
     /// A part far from the rest is left out if it has less than this share of the points.
     pub clean_part: f64,
+    /// Whether shapes are laid onto each other first.
+    pub align: Align,
     /// Whether pairs may mirror the shape.
     pub mirrored: bool,
 }
@@ -111,6 +113,7 @@ impl DataRecipe {
             clean: self.clean,
             clean_strays: self.clean_strays,
             clean_part: self.clean_part,
+            align: self.align,
             mirrored: self.mirrored,
         }
         .to_values()

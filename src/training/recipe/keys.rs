@@ -19,8 +19,8 @@ use isomorph_model::trajectory::Integrator;
 use super::rule::Rule;
 use super::schema::{Key, Keyed, Section, section};
 use super::words::{
-    Activation, Cleaning, Correspondences, DERIVATIVES, GeometryKind, INTEGRATORS, LevelSetForm,
-    NormalSource, Optimiser, Preset, Schedule, TimeSampling, VelocityKind,
+    Activation, Align, Cleaning, Correspondences, DERIVATIVES, GeometryKind, INTEGRATORS,
+    LevelSetForm, NormalSource, Optimiser, Preset, Schedule, TimeSampling, VelocityKind,
 };
 
 /// The most steps, points or files of any kind that a recipe may have.
@@ -90,6 +90,10 @@ section! {
         clean_strays: f64 = 5 | 5 | 5 | 5 | 5, Rule::number(1.5, 1e6);
         /// A part of a cloud far from the rest is left out if it has less than this share of the points.
         clean_part: f64 = 5e-3 | 5e-3 | 5e-3 | 5e-3 | 5e-3, Rule::number(0.0, 1.0).zero("keeps all parts");
+        /// Whether shapes are laid onto each other first, so that only the rest of the motion is learned; results lie
+        /// where the files do. "none": no. "rigid": turned and shifted. "similarity": brought to one size as well.
+        /// "auto": only what is clearly needed, as with other units, far-apart shapes and large turns.
+        align: Align = "none" | "none" | "none" | "none" | "none", Rule::word(Align::WORDS);
         /// Whether pairs may mirror the shape, as left and right hands do. No continuous motion does that.
         mirrored: bool = false | false | false | false | false, Rule::flag();
     }

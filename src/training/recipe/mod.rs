@@ -71,8 +71,8 @@ pub use keys::{
     CheckpointRecipe, ImplicitRecipe, LossRecipe, ResultRecipe, TrainingRecipe, VelocityRecipe,
 };
 pub use words::{
-    Activation, Cleaning, Correspondences, DERIVATIVES, GeometryKind, INTEGRATORS, LevelSetForm,
-    Motion, NormalSource, Optimiser, Preset, Schedule, TimeSampling, VelocityKind,
+    Activation, Align, Cleaning, Correspondences, DERIVATIVES, GeometryKind, INTEGRATORS,
+    LevelSetForm, Motion, NormalSource, Optimiser, Preset, Schedule, TimeSampling, VelocityKind,
 };
 
 use rule::Value;

@@ -236,6 +236,7 @@ fn assemble(
             clean: data.clean,
             clean_strays: data.clean_strays,
             clean_part: data.clean_part,
+            align: data.align,
             mirrored: data.mirrored,
         },
         method: MethodRecipe { name: spec.name },

@@ -92,6 +92,18 @@ words! {
         None = "none",
     }
 
+    /// Whether shapes are laid onto each other before anything is learned.
+    Align {
+        /// They lie as their files say.
+        None = "none",
+        /// By turns and shifts.
+        Rigid = "rigid",
+        /// By turns, shifts and factors of size.
+        Similarity = "similarity",
+        /// By what is clearly needed: mostly nothing.
+        Auto = "auto",
+    }
+
     /// The nonlinearity of a network.
     Activation {
         /// `ln(1 + exp(beta x)) / beta`.
