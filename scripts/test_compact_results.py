@@ -238,8 +238,8 @@ class Kept(unittest.TestCase):
 
     def test_results_stay_few_and_small(self):
         files = [path for path in RESULTS.rglob("*") if path.is_file()]
-        self.assertLess(len(files), 95)
-        self.assertLess(sum(path.stat().st_size for path in files), 4_300_000)
+        self.assertLess(len(files), 97)
+        self.assertLess(sum(path.stat().st_size for path in files), 4_400_000)
 
     def test_links_of_the_overview_lead_to_files_and_every_file_is_linked(self):
         text = (RESULTS / "README.md").read_text("utf-8")

@@ -28,6 +28,28 @@ pub enum GltfError {
     },
 }
 
+/// Whether a shape of so many vertices at so many times can be one file, to be asked before anything is computed.
+///
+/// # Errors
+/// [`GltfError::TooLarge`] if its positions and normals alone are too many.
+pub(crate) fn check_size(
+    vertices: usize,
+    times: usize,
+    is_mesh: bool,
+    precision: Precision,
+) -> Result<(), GltfError> {
+    let (position, normal) = match precision {
+        Precision::Full => (12, 12),
+        Precision::Compact => (8, 4),
+    };
+    let each = if is_mesh { position + normal } else { position };
+    let bytes = vertices.saturating_mul(times).saturating_mul(each);
+    match u32::try_from(bytes) {
+        Ok(_) => Ok(()),
+        Err(_) => Err(GltfError::TooLarge { bytes }),
+    }
+}
+
 /// The extension that allows positions and normals to be integers.
 pub(super) const QUANTISED: &str = "KHR_mesh_quantization";
 
@@ -222,5 +244,21 @@ impl Builder {
             file.extend_from_slice(data);
         }
         Ok(file)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_cannot_be_one_file_is_refused_before_it_is_computed() {
+        let check = |vertices, precision| check_size(vertices, 100, true, precision);
+        assert!(check(1_700_000, Precision::Full).is_ok());
+        assert!(check(1_900_000, Precision::Compact).is_ok());
+        let refused = check(1_900_000, Precision::Full).expect_err("4.6 GB");
+        let said = "4560000000 bytes: a GLB file holds at most 4294967295; ask for fewer times";
+        assert!(refused.to_string().starts_with(said), "{refused}");
+        assert!(check_size(usize::MAX, 2, false, Precision::Compact).is_err());
     }
 }

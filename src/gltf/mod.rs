@@ -22,5 +22,6 @@ mod testing;
 
 pub(crate) use builder::GltfError;
 pub use builder::Precision;
+pub(crate) use builder::check_size;
 pub(crate) use morph::{Material, Morphing, Part, Texture, morphing, shown_colour};
 pub(crate) use sequence::{Still, in_turn};

@@ -206,12 +206,14 @@ fn compare_closed(
     }
 }
 
-/// A mesh with vertices at one place made one, so that its edges are shared.
+/// A mesh with vertices at one place made one, so that its edges are shared, and without triangles that lose a corner by
+/// that, as at the poles of a sphere made of rings.
 fn welded(mesh: &Mesh<f32>) -> Mesh<f32> {
     let first = crate::geometry::weld(&mesh.vertices);
     let name = |vertex: u32| first[vertex as usize];
     let triangles = mesh.triangles.iter().map(|triangle| triangle.map(name));
-    Mesh::new(mesh.vertices.clone(), triangles.collect())
+    let whole = triangles.filter(|[a, b, c]| a != b && b != c && c != a);
+    Mesh::new(mesh.vertices.clone(), whole.collect())
 }
 
 /// So many of them, evenly chosen.
@@ -237,6 +239,29 @@ const FINER: &str = "raise result.resolution; if it stays, parts are thinner tha
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_sphere_of_rings_has_no_holes_at_its_poles() {
+        let (rings, around) = (8u32, 12u32);
+        let vertex = |k: u32| {
+            let polar = std::f32::consts::PI * (k / around) as f32 / rings as f32;
+            let angle = std::f32::consts::TAU * (k % around) as f32 / around as f32;
+            // Exactly on the axis at the poles.
+            let ring = if k / around % rings == 0 {
+                0.0
+            } else {
+                polar.sin()
+            };
+            [ring * angle.cos(), ring * angle.sin(), polar.cos()]
+        };
+        let vertices = (0..(rings + 1) * around).map(vertex).collect();
+        let quads = (0..rings * around).map(|k| {
+            let next = k / around * around + (k + 1) % around;
+            [[k, k + around, next], [next, k + around, next + around]]
+        });
+        let sphere = Mesh::new(vertices, quads.flatten().collect());
+        assert_eq!(welded(&sphere).euler_characteristic(), 2);
+    }
     use crate::geometry::EdgeSharing;
     use crate::geometry::testing::{bumpy_sphere, together};
 

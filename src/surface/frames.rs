@@ -22,7 +22,7 @@ use crate::formats::{
 };
 use crate::geometry::Mesh;
 use crate::geometry::linear::is_finite;
-use crate::gltf::{Precision, Still};
+use crate::gltf::{self, Precision, Still};
 
 /// The files that surfaces, and carried vertices, are written to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -291,7 +291,12 @@ fn carry(
     let CarriedSource { file, time } = source;
     // An animation has no vertices without a place, a file keeps them.
     let shape = match options.format {
-        OutputFormat::Animation(_) => formats::read(file)?,
+        OutputFormat::Animation(precision) => {
+            let shape = formats::read(file)?;
+            let (vertices, times) = (shape.mesh.vertices.len(), options.times.len());
+            gltf::check_size(vertices, times, shape.is_mesh(), precision)?;
+            shape
+        }
         OutputFormat::Frames(_) => formats::read_any(file)?,
     };
     let mut order: Vec<usize> = (0..options.times.len()).collect();

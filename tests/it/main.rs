@@ -15,6 +15,7 @@ mod closed_forms;
 mod comparison;
 mod evaluation;
 mod extraction;
+mod failures;
 mod front_door;
 mod golden;
 mod information;
