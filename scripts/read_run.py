@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
-"""The networks of a run in numpy: reads what `isomorph export` writes, and gives f and V at points.
+"""What a run has learned, in numpy: reads what `isomorph export` writes, and gives f and V at points.
 
     isomorph export runs/fox-quick -o networks.safetensors
     python3 scripts/read_run.py networks.safetensors [--check field.npz]
 
 Prints what the file holds. With --check it compares f and V with those that `isomorph field` wrote of
 the same run, and fails if they differ by more than 1e-5 in normalised units. `Run` is made to be
-copied: it needs numpy alone. Points are `[n, 3]` in the coordinates of the shapes, times 0 to 1.
+copied: it needs numpy alone. Points are `[n, 3]` in the coordinates of the shapes, times those of the run's shapes. Of
+splines f is the blend of two signed distances, which are computed triangle by triangle here: slowly.
 """
 
 import argparse
@@ -26,18 +27,26 @@ class Run:
         self.arrays = {}
         for name, entry in header.items():
             first, last = (start + offset for offset in entry["data_offsets"])
-            array = np.frombuffer(data[first:last], "<f4").reshape(entry["shape"])
-            self.arrays[name] = array.astype(np.float64)
+            kind, number = {"F32": ("<f4", np.float64), "U32": ("<u4", np.int64)}[entry["dtype"]]
+            array = np.frombuffer(data[first:last], kind).reshape(entry["shape"])
+            self.arrays[name] = array.astype(number)
         frame = self.about["normalisation"]
         self.centre, self.scale = np.array(frame["centre"]), frame["scale"]
+        self.first, last = self.about["clock"]
+        self.span = last - self.first
+        self.splines = self.about.get("splines")
+        if self.about["placements"]:
+            raise ValueError("shapes were laid onto each other (data.align): use `isomorph field`")
 
     def velocity(self, points: np.ndarray, t: float) -> np.ndarray:
         """V, in the shapes' unit per unit of time."""
-        return self._v(self._normalised(points), t) / self.scale
+        return self._v(self._normalised(points), self._unit(t)) / self.scale / self.span
 
     def distance(self, points: np.ndarray, t: float) -> np.ndarray:
         """f, in the shapes' unit, negative inside."""
-        x = self._normalised(points)
+        x, t = self._normalised(points), self._unit(t)
+        if self.splines:
+            return self._blend(x, t) / self.scale
         if self.about["geometry"] == "network":
             return self._f("implicit", x, t) / self.scale
         g = self._f("source", self._carried(x, t, 0.0), 0.0)
@@ -46,22 +55,37 @@ class Run:
 
     def carried(self, points: np.ndarray, start: float, end: float) -> np.ndarray:
         """Where points that are at `points` at time `start` are at time `end`."""
-        x = self._normalised(points)
+        x, start, end = self._normalised(points), self._unit(start), self._unit(end)
         return points + (self._carried(x, start, end) - x) / self.scale
+
+    def _unit(self, t: float) -> float:
+        return (t - self.first) / self.span
 
     def _normalised(self, points: np.ndarray) -> np.ndarray:
         return (np.asarray(points, np.float64) - self.centre) * self.scale
 
     def _carried(self, x: np.ndarray, start: float, end: float) -> np.ndarray:
         """Runge-Kutta steps of order 4, each span of time with its share of them."""
-        steps = max(1, int(np.ceil(abs(end - start) * (self.about["flow_steps"] or 32))))
+        if self.splines:
+            parts = self.splines["intervals"]
+            for part in parts if start <= end else parts[::-1]:
+                a, b = (np.clip(t, part["from"], part["to"]) for t in (start, end))
+                if a != b:
+                    own = [(t - part["from"]) / (part["to"] - part["from"]) for t in (a, b)]
+                    # The interval's own field, also at its very ends.
+                    x = self._steps(x, a, b, abs(own[1] - own[0]) * part["steps"], part)
+            return x
+        return self._steps(x, start, end, abs(end - start) * (self.about["flow_steps"] or 32))
+
+    def _steps(self, x, start, end, share, part=None):
+        steps = max(1, int(np.ceil(share)))
         dt = (end - start) / steps
         for k in range(steps):
             t = start + k * dt
-            a = self._v(x, t)
-            b = self._v(x + dt / 2 * a, t + dt / 2)
-            c = self._v(x + dt / 2 * b, t + dt / 2)
-            d = self._v(x + dt * c, t + dt)
+            a = self._v(x, t, part)
+            b = self._v(x + dt / 2 * a, t + dt / 2, part)
+            c = self._v(x + dt / 2 * b, t + dt / 2, part)
+            d = self._v(x + dt * c, t + dt, part)
             x = x + dt / 6 * (a + 2 * b + 2 * c + d)
         return x
 
@@ -74,12 +98,54 @@ class Run:
             value = value + rounded - np.sqrt(about["sphere_radius"] ** 2 + 0.01)
         return value
 
-    def _v(self, x: np.ndarray, t: float) -> np.ndarray:
+    def _v(self, x: np.ndarray, t: float, part: dict | None = None) -> np.ndarray:
+        if self.splines:
+            return self._spline(x, t, part or self._part(t)[1])
         about = self.about["networks"]["velocity"]
         features = self._encoded(x, about["frequencies"])
         if about["time_dependent"]:
             features = np.hstack([features, np.full((len(x), 1), t - 0.5)])
         return self._mlp("velocity", features)
+
+    def _part(self, t: float) -> tuple[int, dict]:
+        """The interval of a time: the last one that has begun."""
+        parts = self.splines["intervals"]
+        k = max((k for k, part in enumerate(parts) if part["from"] <= t), default=0)
+        return k, parts[k]
+
+    def _spline(self, x: np.ndarray, t: float, part: dict) -> np.ndarray:
+        """Quadratic B-splines in space, polynomials in the interval's own time."""
+        c = self.arrays[f"velocity.{self.splines['intervals'].index(part)}.coefficients"]
+        own = (t - part["from"]) / (part["to"] - part["from"])
+        c = np.einsum("xyzka,k->xyza", c, np.array(part["time_functions"]) @ own ** np.arange(3))
+        place = np.clip((x - part["lower"]) / part["spacing"], 0, part["cells"])
+        cell = np.minimum(place.astype(int), np.array(part["cells"]) - 1)
+        u = place - cell
+        weights = np.stack([(1 - u) ** 2 / 2, 0.5 + u * (1 - u), u**2 / 2])
+        v = np.zeros((len(x), 3))
+        for i, j, k in np.ndindex(3, 3, 3):
+            share = weights[i, :, 0] * weights[j, :, 1] * weights[k, :, 2]
+            v += share[:, None] * c[cell[:, 0] + i, cell[:, 1] + j, cell[:, 2] + k]
+        # The coefficients are of the interval's own time.
+        return v / (part["to"] - part["from"])
+
+    def _blend(self, x: np.ndarray, t: float) -> np.ndarray:
+        """The distances of the shapes before and after, where the point comes from and goes to."""
+        k, part = self._part(t)
+        if any(self.splines["partial"][k : k + 2]):
+            raise ValueError("a shape is known in part: its blend is more than this script knows")
+        own = (t - part["from"]) / (part["to"] - part["from"])
+        weight = own if len(self.splines["intervals"]) == 1 else own**2 * (3 - 2 * own)
+        g = self._signed(k, self._carried(x, t, part["from"]))
+        h = self._signed(k + 1, self._carried(x, t, part["to"]))
+        return (1 - weight) * g + weight * h
+
+    def _signed(self, shape: int, x: np.ndarray) -> np.ndarray:
+        """The signed distance of a closed mesh."""
+        points, triangles = (self.arrays[f"shape.{shape}.{of}"] for of in ("points", "triangles"))
+        at_once = max(1, 2_000_000 // len(triangles))
+        chunks = [x[k : k + at_once] for k in range(0, len(x), at_once)]
+        return np.concatenate([signed_distance(chunk, points[triangles]) for chunk in chunks])
 
     @staticmethod
     def _encoded(x: np.ndarray, frequencies: int) -> np.ndarray:
@@ -105,6 +171,29 @@ class Run:
         raise AssertionError("the output layer returns")
 
 
+def signed_distance(x: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """Distances of points from triangles `[m, 3, 3]`, negative where the winding number is over 1/2."""
+    d = corners[None] - x[:, None, None]
+    a, b, c = d[:, :, 0], d[:, :, 1], d[:, :, 2]
+    nearest = np.full(len(x), np.inf)
+    for p, q in ((a, b), (b, c), (c, a)):
+        edge = q - p
+        along = -(p * edge).sum(-1) / np.maximum((edge**2).sum(-1), 1e-30)
+        off = p + np.clip(along, 0, 1)[..., None] * edge
+        nearest = np.minimum(nearest, (off**2).sum(-1).min(1))
+    normal = np.cross(b - a, c - a)
+    inside = [(np.cross(p, q) * normal).sum(-1) >= 0 for p, q in ((a, b), (b, c), (c, a))]
+    square = (a * normal).sum(-1) ** 2 / np.maximum((normal**2).sum(-1), 1e-30)
+    plane = np.where(np.logical_and.reduce(inside), square, np.inf)
+    nearest = np.minimum(nearest, plane.min(1))
+    # Van Oosterom and Strackee, "The solid angle of a plane triangle", 1983.
+    la, lb, lc = (np.sqrt((p**2).sum(-1)) for p in (a, b, c))
+    volume = (a * np.cross(b, c)).sum(-1)
+    below = la * lb * lc + (a * b).sum(-1) * lc + (b * c).sum(-1) * la + (c * a).sum(-1) * lb
+    winding = np.arctan2(volume, below).sum(1) / (2 * np.pi)
+    return np.where(winding > 0.5, -1, 1) * np.sqrt(nearest)
+
+
 def check(run: Run, path: Path) -> float:
     """The largest difference from a grid of `isomorph field`, in normalised units."""
     grid = np.load(path)
@@ -113,7 +202,7 @@ def check(run: Run, path: Path) -> float:
     for k, t in enumerate(grid["times"]):
         f = run.distance(points, t) - grid["f"][k].reshape(-1)
         v = run.velocity(points, t) - grid["velocity"][k].reshape(-1, 3)
-        worst = max(worst, np.abs(f).max(), np.abs(v).max())
+        worst = max(worst, np.abs(f).max(), np.abs(v).max() * run.span)
     return worst * run.scale
 
 

@@ -1,4 +1,4 @@
-//! `isomorph export`: the networks of a run for programs of other languages.
+//! `isomorph export`: what a run has learned, for programs of other languages.
 
 use std::path::PathBuf;
 
@@ -7,9 +7,9 @@ use isomorph::export;
 
 use super::{BackendArgs, Result, print};
 
-/// Write the networks of a run as safetensors, for PyTorch, JAX or numpy
+/// Write what a run has learned as safetensors, for PyTorch, JAX or numpy: networks, or splines and shapes
 ///
-/// The metadata of the file describe the networks, the frame of the shapes and how f is made of them.
+/// The metadata of the file describe the arrays, the frame of the shapes and how f is made of them.
 /// scripts/read_run.py evaluates f and V from it with numpy alone.
 #[derive(Debug, Args)]
 pub(super) struct ExportArgs {
@@ -32,7 +32,7 @@ pub(super) struct ExportArgs {
 pub(super) fn run(args: ExportArgs) -> Result {
     let found = export(&args.run, &args.output, args.place.backend()?)?;
     print(&format!(
-        "{}: {} arrays of {} weights\n",
+        "{}: {} arrays of {} numbers\n",
         args.output.display(),
         found.tensors,
         found.weights

@@ -1,23 +1,26 @@
-//! The networks of a run as one file that programs of other languages read: safetensors, with a description of what
-//! the arrays are.
+//! What a run has learned as one file that programs of other languages read: safetensors, with a description of what
+//! the arrays are. Networks, or splines and the shapes that they carry.
 //!
-//! The description is JSON under the key `isomorph` of the file's metadata. `scripts/read_run.py` evaluates the
-//! networks from it, in Python with numpy alone.
+//! The description is JSON under the key `isomorph` of the file's metadata. `scripts/read_run.py` evaluates
+//! f and V from it, in Python with numpy alone.
 
 use std::collections::HashMap;
 use std::path::Path;
 
 use isomorph_training::method::spec_of;
+use isomorph_training::method::spline::is_solved;
 use safetensors::tensor::{Dtype, TensorView, serialize};
 use serde_json::{Value, json};
 
 use super::checkpoint::Checkpoint;
+use super::clock::Clock;
 use super::folder::RunFolder;
 use super::learned::restored;
 use crate::atomic::write_atomically;
 use crate::backend::Backend;
 use crate::error::{Error, Result};
 use crate::recipe::{GeometryKind, Recipe};
+use crate::solved::arrays;
 
 /// What was written.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -31,7 +34,7 @@ pub struct Exported {
 /// The form of the description.
 const FORMAT: u32 = 1;
 
-/// Writes the networks of a run's newest checkpoint.
+/// Writes what a run's newest checkpoint has learned: the networks, or the splines and the shapes that they carry.
 ///
 /// # Errors
 /// A folder that is no run, a damaged checkpoint, a method without networks of `f` and `V`, a file that cannot be
@@ -40,34 +43,104 @@ pub fn export(run: &Path, out: &Path, backend: Backend) -> Result<Exported> {
     let folder = RunFolder::open(run)?;
     let checkpoint = Checkpoint::newest(&folder.checkpoints())?;
     let recipe = checkpoint.recipe()?;
-    let trainer = restored(&checkpoint, &recipe, &*backend.open()?)?;
+    let arrays = match is_solved(&recipe) {
+        true => splines(&recipe, &checkpoint)?,
+        false => networks(run, &recipe, &checkpoint, backend)?,
+    };
+    let views = arrays.parts.iter().map(|part| {
+        let view = TensorView::new(part.kind, part.sides.clone(), &part.bytes);
+        view.map(|view| (part.name.clone(), view))
+    });
+    let views = views.collect::<std::result::Result<Vec<_>, _>>();
+    let metadata = HashMap::from([("isomorph".to_owned(), arrays.about.to_string())]);
+    let file = views.and_then(|views| serialize(views, Some(metadata)));
+    let file = file.map_err(Error::failure)?;
+    write_atomically(out, |to| to.write_all(&file))?;
+    let numbers = |part: &Part| part.sides.iter().product::<usize>();
+    Ok(Exported {
+        tensors: arrays.parts.len(),
+        weights: arrays.parts.iter().map(numbers).sum(),
+    })
+}
+
+/// An array of a file.
+struct Part {
+    name: String,
+    kind: Dtype,
+    sides: Vec<usize>,
+    bytes: Vec<u8>,
+}
+
+impl Part {
+    fn floats(name: String, sides: Vec<usize>, values: &[f32]) -> Self {
+        Self {
+            name,
+            kind: Dtype::F32,
+            sides,
+            bytes: values.iter().flat_map(|x| x.to_le_bytes()).collect(),
+        }
+    }
+}
+
+/// All of a file.
+struct Arrays {
+    parts: Vec<Part>,
+    about: Value,
+}
+
+/// The networks of `f` and `V`.
+fn networks(
+    run: &Path,
+    recipe: &Recipe,
+    checkpoint: &Checkpoint,
+    backend: Backend,
+) -> Result<Arrays> {
+    let trainer = restored(checkpoint, recipe, &*backend.open()?)?;
     let weights = trainer.weights().ok_or_else(|| {
         Error::usage(format!(
             "{}: {} has no networks of f and V; train with the preset \"quick\" or \"default\"",
             run.display(),
-            spec_of(&recipe).described()
+            spec_of(recipe).described()
         ))
     })?;
-    let bytes: Vec<Vec<u8>> = (weights.tensors.iter())
-        .map(|tensor| tensor.values.iter().flat_map(|x| x.to_le_bytes()).collect())
+    let parts = weights.tensors.into_iter();
+    Ok(Arrays {
+        parts: parts
+            .map(|tensor| Part::floats(tensor.name, tensor.shape, &tensor.values))
+            .collect(),
+        about: described(recipe, checkpoint, weights.flow_steps),
+    })
+}
+
+/// The splines of `V`, and the closed meshes whose signed distances `f` is made of.
+fn splines(recipe: &Recipe, checkpoint: &Checkpoint) -> Result<Arrays> {
+    let found = arrays(&checkpoint.records()?).map_err(|error| checkpoint.damaged(error))?;
+    let floats = found.floats.into_iter();
+    let mut parts: Vec<Part> = floats
+        .map(|(name, sides, values)| Part::floats(name, sides, &values))
         .collect();
-    let views = weights.tensors.iter().zip(&bytes).map(|(tensor, bytes)| {
-        let view = TensorView::new(Dtype::F32, tensor.shape.clone(), bytes);
-        view.map(|view| (tensor.name.clone(), view))
-    });
-    let views = views.collect::<std::result::Result<Vec<_>, _>>();
-    let description = described(&recipe, &checkpoint, weights.flow_steps).to_string();
-    let metadata = HashMap::from([("isomorph".to_owned(), description)]);
-    let file = views.and_then(|views| serialize(views, Some(metadata)));
-    let file = file.map_err(Error::failure)?;
-    write_atomically(out, |to| to.write_all(&file))?;
-    Ok(Exported {
-        tensors: weights.tensors.len(),
-        weights: weights
-            .tensors
-            .iter()
-            .map(|tensor| tensor.values.len())
-            .sum(),
+    parts.extend(found.indices.into_iter().map(|(name, sides, values)| Part {
+        name,
+        kind: Dtype::U32,
+        sides,
+        bytes: values.iter().flat_map(|x| x.to_le_bytes()).collect(),
+    }));
+    let mut about = frame(recipe, checkpoint);
+    about["geometry"] = json!("splines");
+    about["splines"] = found.about;
+    Ok(Arrays { parts, about })
+}
+
+/// The frame of the shapes in space and time.
+fn frame(recipe: &Recipe, checkpoint: &Checkpoint) -> Value {
+    let state = &checkpoint.state;
+    json!({
+        "format": FORMAT,
+        "normalisation": {"centre": state.normalisation.centre, "scale": state.normalisation.scale},
+        "placements": state.placements,
+        "clock": Clock::of(recipe).span(),
+        "box": {"min": state.bounds.min, "max": state.bounds.max},
+        "step": state.step,
     })
 }
 
@@ -75,7 +148,6 @@ pub fn export(run: &Path, out: &Path, backend: Backend) -> Result<Exported> {
 fn described(recipe: &Recipe, checkpoint: &Checkpoint, flow_steps: Option<usize>) -> Value {
     let f = &recipe.implicit;
     let v = &recipe.velocity;
-    let state = &checkpoint.state;
     let field = json!({
         "depth": f.depth, "activation": f.activation.to_string(), "beta": f.beta,
         "frequencies": f.frequencies, "skip": f.skip, "sphere_radius": f.sphere_radius,
@@ -91,14 +163,9 @@ fn described(recipe: &Recipe, checkpoint: &Checkpoint, flow_steps: Option<usize>
     for name in names {
         networks[*name] = field.clone();
     }
-    json!({
-        "format": FORMAT,
-        "geometry": recipe.implicit.geometry.to_string(),
-        "flow_steps": flow_steps,
-        "networks": networks,
-        "normalisation": {"centre": state.normalisation.centre, "scale": state.normalisation.scale},
-        "placements": state.placements,
-        "box": {"min": state.bounds.min, "max": state.bounds.max},
-        "step": state.step,
-    })
+    let mut about = frame(recipe, checkpoint);
+    about["geometry"] = json!(recipe.implicit.geometry.to_string());
+    about["flow_steps"] = json!(flow_steps);
+    about["networks"] = networks;
+    about
 }

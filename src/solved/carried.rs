@@ -31,6 +31,15 @@ const MOST_STEPS: usize = 32;
 /// Points of each shape that decide how many steps it takes.
 const PROBES: usize = 2000;
 
+/// How many steps the integrator takes over all of time, by points of both shapes.
+pub(super) fn steps_of<const H: usize>(
+    field: &SplineField<f32, H>,
+    points: [&[[f32; 3]]; 2],
+) -> usize {
+    let probes = points.map(|points| some_of(points, PROBES));
+    field.steps_within([&probes[0], &probes[1]], TOLERANCE, [2, MOST_STEPS])
+}
+
 /// Two neighbouring shapes and the field that carries them.
 pub(super) struct CarriedShapes<const H: usize> {
     field: SplineField<f32, H>,
@@ -43,10 +52,10 @@ pub(super) struct CarriedShapes<const H: usize> {
 
 impl<const H: usize> CarriedShapes<H> {
     pub(super) fn new(field: SplineField<f32, H>, shapes: [Arc<Solid>; 2], is_part: bool) -> Self {
-        let probes = shapes
-            .each_ref()
-            .map(|shape| some_of(&shape.parts().points, PROBES));
-        let steps = field.steps_within([&probes[0], &probes[1]], TOLERANCE, [2, MOST_STEPS]);
+        let steps = steps_of(
+            &field,
+            shapes.each_ref().map(|shape| &shape.parts().points[..]),
+        );
         Self {
             field,
             shapes,

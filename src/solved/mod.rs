@@ -11,9 +11,11 @@
 //! | `shapes.rs` | the shapes that it carries |
 //! | `guide.rs` | the field as what a network learns first |
 //! | `stored.rs` | its part of a checkpoint |
+//! | `arrays.rs` | the same as plain arrays, for other programs |
 //!
 //! The mathematics is in the package `isomorph-spline`, the distance of a shape in [`crate::shape`].
 
+mod arrays;
 mod carried;
 mod guide;
 mod motion;
@@ -35,6 +37,7 @@ use isomorph_training::report::{Phase, Rates, TermReport};
 use isomorph_training::weights::Weights as NetworkWeights;
 use rayon::prelude::*;
 
+pub(crate) use self::arrays::arrays;
 use self::carried::CarriedShapes;
 pub(crate) use self::guide::guide;
 use self::motion::{AnySolver, Field};
@@ -189,7 +192,7 @@ impl Trainer for Solved {
         Ok(())
     }
 
-    /// Not yet: they would be of splines, and the shapes.
+    /// It has no networks; [`arrays`] gives its splines and shapes.
     fn weights(&self) -> Option<NetworkWeights> {
         None
     }

@@ -309,3 +309,41 @@ fn a_sequence_that_was_stopped_ends_in_the_same_field() {
         "the same field, bit for bit"
     );
 }
+
+#[test]
+fn splines_and_shapes_are_exported_with_a_description() {
+    let _turn = turn();
+    let place = falling(&[0, 1, 3]);
+    let morph = [
+        "morph",
+        "scan-0.ply",
+        "scan-1.ply",
+        "scan-3.ply",
+        "--times",
+        "0,1,3",
+    ];
+    place
+        .isomorph(&[&morph[..], &["-o", "run", "--frames", "2"], &SMALL].concat())
+        .succeeded();
+    let export = ["export", "run", "-o", "run.safetensors"];
+    place.isomorph(&export).succeeded();
+    let file = fs::read(place.path("run.safetensors")).expect("a file");
+    let length = u64::from_le_bytes(file[..8].try_into().expect("eight bytes")) as usize;
+    let header: serde_json::Value = serde_json::from_slice(&file[8..8 + length]).expect("a header");
+    let about = header["__metadata__"]["isomorph"].as_str().expect("text");
+    let about: serde_json::Value = serde_json::from_str(about).expect("a description");
+    assert_eq!(about["geometry"], "splines");
+    assert_eq!(about["clock"], serde_json::json!([0.0, 3.0]));
+    let intervals = about["splines"]["intervals"].as_array().expect("a list");
+    assert_eq!(intervals.len(), 2);
+    assert_eq!(intervals[1]["to"], 1.0);
+    for (s, interval) in intervals.iter().enumerate() {
+        let sides = &header[format!("velocity.{s}.coefficients")]["shape"];
+        let cells = interval["cells"].as_array().expect("three").iter();
+        let nodes = cells.map(|count| count.as_u64().expect("a count") + 2);
+        let functions = interval["time_functions"].as_array().expect("a list").len() as u64;
+        let wanted: Vec<u64> = nodes.chain([functions, 3]).collect();
+        assert_eq!(*sides, serde_json::json!(wanted));
+    }
+    assert_eq!(header["shape.2.triangles"]["dtype"], "U32");
+}
