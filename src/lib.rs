@@ -33,6 +33,7 @@ pub mod guide;
 
 mod atomic;
 mod backend;
+pub mod batch;
 mod charts;
 mod compare;
 mod cubes;
@@ -97,6 +98,11 @@ pub mod correspondence {
 /// Corresponding vertices of two shapes, picked by hand on a page in the browser.
 pub mod picking {
     pub use crate::landmarks::{Picker, Served};
+}
+
+/// Where runs stand.
+pub mod status {
+    pub use crate::session::state::{RunState, RunStatus, run_status};
 }
 
 /// Normals of a raw point cloud, all pointing out of the shape.

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use isomorph::status::run_status;
 
 use super::{Result, print};
 
@@ -11,8 +12,16 @@ use super::{Result, print};
 pub(super) struct InfoArgs {
     /// File, or folder of a run
     path: PathBuf,
+
+    /// Print where a run stands as JSON: waiting, running, interrupted, failed or done, and its figures
+    #[arg(long)]
+    json: bool,
 }
 
 pub(super) fn run(args: InfoArgs) -> Result {
+    if args.json {
+        let status = run_status(&args.path)?;
+        return print(&(serde_json::to_string_pretty(&status)? + "\n"));
+    }
     print(&isomorph::describe(&args.path)?)
 }

@@ -10,6 +10,7 @@
     reason = "what talks to people and ends the process is here"
 )]
 
+mod batch;
 mod bench;
 mod clean;
 mod compare;
@@ -73,6 +74,7 @@ enum Command {
     Export(export::ExportArgs),
     Evaluate(evaluate::EvaluateArgs),
     Compare(compare::CompareArgs),
+    Batch(batch::BatchArgs),
     Match(match_shapes::MatchArgs),
     Pick(pick::PickArgs),
     Clean(clean::CleanArgs),
@@ -170,6 +172,10 @@ enum Failure {
     Library(isomorph::Error),
     /// A mistake on the command line that clap cannot find.
     Usage(String),
+    /// What went wrong, in a sentence.
+    Failed(String),
+    /// It was stopped, which was said.
+    Stopped,
     /// Standard output cannot be written.
     Output(io::Error),
     /// This device does not compute what a processor does, which was printed.
@@ -203,6 +209,8 @@ impl Failure {
             }
             Self::Output(error) => (ErrorKind::Failure, format!("standard output: {error}")),
             Self::Usage(text) => (ErrorKind::Usage, text),
+            Self::Failed(text) => (ErrorKind::Failure, text),
+            Self::Stopped => (ErrorKind::Interruption, String::new()),
             Self::Contradicted => (
                 ErrorKind::Failure,
                 "the result contradicts the shapes that were given (--strict); all files were written".to_owned(),
@@ -235,6 +243,7 @@ pub(crate) fn run(cli: Cli) -> ExitCode {
         Command::Export(args) => export::run(args),
         Command::Evaluate(args) => evaluate::run(args),
         Command::Compare(args) => compare::run(args),
+        Command::Batch(args) => batch::run(args),
         Command::Match(args) => match_shapes::run(args),
         Command::Pick(args) => pick::run(args),
         Command::Clean(args) => clean::run(args),

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use isomorph::status::{RunState, run_status};
 use isomorph::{Event, Recipe, Session};
 
 use super::view::show;
@@ -41,13 +42,42 @@ impl NewRunArgs {
         recipe: Recipe,
         folder: &Path,
         change: impl FnOnce(Session) -> Session,
-        mut on_event: impl FnMut(&Event),
+        on_event: impl FnMut(&Event),
     ) -> Result<Option<PathBuf>> {
         let session = Session::prepare(recipe, folder, self.place.backend()?)?;
         let mut session = change(session.stopped_by(stop_on_interrupt()));
         if self.force {
             session = session.replacing();
         }
+        self.watched(session, folder, on_event)
+    }
+
+    /// Goes on with the run of this recipe in a folder; nothing is done if it is finished.
+    pub(super) fn go_on(&self, recipe: &Recipe, folder: &Path) -> Result<Option<PathBuf>> {
+        let session = Session::resume(folder, &[], self.place.backend()?)?;
+        let changes = session.recipe().changes(recipe);
+        if let Some(change) = changes.first() {
+            return Err(Failure::Usage(format!(
+                "{}: is a run of another recipe ({change}); choose another folder with --run",
+                folder.display()
+            )));
+        }
+        if run_status(folder)?.state == RunState::Done {
+            if self.progress.is_for_people() {
+                eprintln!("{}: is finished already", folder.display());
+            }
+            return Ok(None);
+        }
+        self.watched(session.stopped_by(stop_on_interrupt()), folder, |_| {})
+    }
+
+    /// Trains a session and shows its events; the page of the run, if one was written.
+    fn watched(
+        &self,
+        mut session: Session,
+        folder: &Path,
+        mut on_event: impl FnMut(&Event),
+    ) -> Result<Option<PathBuf>> {
         let mut terminal = self.progress.terminal(folder);
         let (mut page, mut contradicted) = (None, false);
         session.train(|event| {

@@ -22,6 +22,10 @@ pub(super) struct TrainArgs {
     #[arg(long, value_name = "DIR")]
     run: Option<PathBuf>,
 
+    /// Go on with the run if it is there, and do nothing if it is finished; for jobs that may be started again
+    #[arg(long, conflicts_with = "force")]
+    resume_if_exists: bool,
+
     #[command(flatten)]
     new: NewRunArgs,
 }
@@ -30,6 +34,11 @@ pub(super) fn run(args: TrainArgs) -> Result {
     let recipe =
         Recipe::read(&args.recipe, &args.new.set.overrides).map_err(isomorph::Error::from)?;
     let folder = args.run.unwrap_or_else(|| default_run(&args.recipe));
+    if args.resume_if_exists && is_run(&folder) {
+        let page = args.new.go_on(&recipe, &folder)?;
+        args.new.open(page.as_deref());
+        return Ok(());
+    }
     if !args.new.force && is_run(&folder) {
         let folder = folder.display();
         return Err(Failure::Usage(format!(

@@ -179,9 +179,15 @@ impl RunFolder {
                 fs::remove_dir_all(folder)?;
             }
         }
-        let mut files = ["metrics.jsonl", "run.log", PAIRS, "report.html"]
-            .map(str::to_owned)
-            .to_vec();
+        let mut files = [
+            "metrics.jsonl",
+            "run.log",
+            PAIRS,
+            "report.html",
+            super::state::FAILED,
+        ]
+        .map(str::to_owned)
+        .to_vec();
         let names = fs::read_dir(&self.0)?.flatten();
         let names = names.filter_map(|entry| entry.file_name().into_string().ok());
         files.extend(names.filter(|name| is_pairs_of_interval(name)));

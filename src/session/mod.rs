@@ -56,6 +56,7 @@ mod report_log;
 mod report_truth;
 pub(crate) mod sampled_field;
 pub(crate) mod self_test;
+pub(crate) mod state;
 pub(crate) mod stop;
 pub(crate) mod train;
 pub(crate) mod trained;

@@ -12,11 +12,12 @@ use super::learner::{self, Learner, LearnerError, Outcome};
 use super::lock::RunLock;
 use super::log::RunLog;
 use super::prepare::{self, Prepared};
+use super::state::FAILED;
 use super::stop::StopFlag;
 use super::trained::Trained;
 use crate::atomic::write_atomically;
 use crate::backend::Backend;
-use crate::error::{Error, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::event::Event;
 use crate::formats::{Shape, SurfaceFormat};
 use crate::recipe::Recipe;
@@ -196,7 +197,18 @@ impl Session {
     /// holds all steps so far. Else what keeps the run from being trained; the checkpoints written so far
     /// stay.
     pub fn train(&mut self, mut on_event: impl FnMut(&Event)) -> Result<Trained> {
-        self.train_dyn(&mut on_event)
+        let ended = self.train_dyn(&mut on_event);
+        if let Err(error) = &ended
+            && error.kind() == ErrorKind::Failure
+            && let Ok(run) = RunFolder::open(&self.folder)
+        {
+            // For whoever looks at the folder later; it is said now as well.
+            let text = format!("{error}\n");
+            let _ = write_atomically(&run.path().join(FAILED), |out| {
+                out.write_all(text.as_bytes())
+            });
+        }
+        ended
     }
 
     fn train_dyn(&mut self, on_event: &mut dyn FnMut(&Event)) -> Result<Trained> {
@@ -410,6 +422,7 @@ struct Begun {
 }
 
 impl Begun {
+    /// What failed before does not stand any more.
     fn new(
         run: RunFolder,
         lock: RunLock,
@@ -418,6 +431,7 @@ impl Begun {
         prepared: &Prepared,
     ) -> Self {
         let keyframes = &prepared.keyframes;
+        let _ = std::fs::remove_file(run.path().join(FAILED));
         Self {
             run,
             _lock: lock,

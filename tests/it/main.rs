@@ -11,6 +11,7 @@ mod bad_methods;
 mod bad_recipes;
 mod bad_runs;
 mod bad_shapes;
+mod batches;
 mod closed_forms;
 mod comparison;
 mod evaluation;

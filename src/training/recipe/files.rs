@@ -18,7 +18,7 @@ pub(super) fn stands_for_many(path: &Path) -> bool {
 ///
 /// # Errors
 /// What the file system says, or what is wrong with the pattern.
-pub(super) fn listed(path: &Path) -> Result<Vec<PathBuf>, String> {
+pub fn listed(path: &Path) -> Result<Vec<PathBuf>, String> {
     let mut files = if path.is_dir() {
         files_in(path, &SHAPES).map_err(|error| error.to_string())?
     } else {

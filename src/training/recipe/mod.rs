@@ -64,7 +64,7 @@ use std::fmt;
 
 pub use data::{DataRecipe, KeyframeRecipe};
 pub use error::RecipeError;
-pub use files::{files_in, natural_order};
+pub use files::{files_in, listed, natural_order};
 pub use isomorph_model::operators::Derivatives;
 pub use isomorph_model::trajectory::Integrator;
 pub use keys::{

@@ -1,0 +1,222 @@
+//! The figures of all runs of a batch: as CSV and JSON for programs, as a page for people.
+
+use std::fmt::Write as _;
+use std::io::{self, Write};
+use std::path::PathBuf;
+
+use serde_json::Value;
+
+use super::jobs::Batch;
+use super::table::{JobStatus, statuses};
+use crate::atomic::write_atomically;
+use crate::error::Result;
+use crate::session::state::RunState;
+
+/// What was collected, and where.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Collected {
+    /// All jobs.
+    pub jobs: usize,
+    /// Those that are done.
+    pub done: usize,
+    /// Those that failed.
+    pub failed: usize,
+    /// `results.csv`, `results.json` and `index.html`.
+    pub files: [PathBuf; 3],
+}
+
+/// The columns of the CSV.
+const COLUMNS: [&str; 16] = [
+    "name",
+    "source",
+    "target",
+    "state",
+    "step",
+    "steps",
+    "seconds",
+    "wall_seconds",
+    "peak_memory_bytes",
+    "total",
+    "surfaces",
+    "consistency",
+    "chamfer",
+    "tracked_rmse",
+    "doubts",
+    "reason",
+];
+
+/// Writes the figures of all jobs into the folder of the batch. Runs are read one after the other, and no more than one
+/// is held.
+///
+/// # Errors
+/// The folder cannot be written.
+pub fn collect(batch: &Batch) -> Result<Collected> {
+    std::fs::create_dir_all(&batch.folder)?;
+    let files = ["results.csv", "results.json", "index.html"].map(|name| batch.folder.join(name));
+    let (mut done, mut failed) = (0, 0);
+    write_atomically(&files[0], |csv| {
+        writeln!(csv, "{}", COLUMNS.join(","))?;
+        for job in statuses(batch) {
+            done += usize::from(job.run.state == RunState::Done);
+            failed += usize::from(matches!(job.run.state, RunState::Failed { .. }));
+            let row = row(batch, &job).map(|value| quoted(&value));
+            writeln!(csv, "{}", row.join(","))?;
+        }
+        Ok(())
+    })?;
+    write_atomically(&files[1], |out| {
+        let mut before = "[\n";
+        for job in statuses(batch) {
+            let mut value = serde_json::to_value(&job).map_err(io::Error::other)?;
+            value["evaluation"] = evaluation(batch, &job).unwrap_or(Value::Null);
+            write!(out, "{before}{value}")?;
+            before = ",\n";
+        }
+        writeln!(out, "\n]")
+    })?;
+    write_atomically(&files[2], |out| page(batch, out))?;
+    Ok(Collected {
+        jobs: batch.jobs.len(),
+        done,
+        failed,
+        files,
+    })
+}
+
+/// The means of an evaluation, if there was one.
+fn evaluation(batch: &Batch, job: &JobStatus) -> Option<Value> {
+    let path = batch.folder.join(&job.name).join("evaluation.json");
+    let text = std::fs::read_to_string(path).ok()?;
+    let mut value: Value = serde_json::from_str(&text).ok()?;
+    Some(value["mean"].take())
+}
+
+fn row(batch: &Batch, job: &JobStatus) -> [String; 16] {
+    fn text<T: ToString>(value: Option<T>) -> String {
+        value.map_or_else(String::new, |value| value.to_string())
+    }
+    let run = &job.run;
+    let mean = evaluation(batch, job).unwrap_or(Value::Null);
+    let measured = |of: &str, key: &str| text(mean[of][key].as_f64());
+    [
+        job.name.clone(),
+        job.files[0].clone(),
+        job.files[1].clone(),
+        word(&run.state).to_owned(),
+        run.step.to_string(),
+        text(run.steps),
+        text(run.seconds),
+        text(run.wall_seconds),
+        text(run.peak_memory_bytes),
+        text(run.total),
+        run.surfaces.to_string(),
+        text(run.consistency),
+        measured("surface", "chamfer"),
+        measured("carried", "tracked_rmse"),
+        run.doubts.len().to_string(),
+        reason(&run.state).to_owned(),
+    ]
+}
+
+/// A state in one word.
+pub(super) fn word(state: &RunState) -> &'static str {
+    match state {
+        RunState::Waiting => "waiting",
+        RunState::Running { .. } => "running",
+        RunState::Interrupted => "interrupted",
+        RunState::Failed { .. } => "failed",
+        RunState::Done => "done",
+    }
+}
+
+fn reason(state: &RunState) -> &str {
+    match state {
+        RunState::Failed { reason } => reason,
+        RunState::Running { by } => by,
+        _ => "",
+    }
+}
+
+/// A field of a CSV (RFC 4180).
+fn quoted(value: &str) -> String {
+    if value.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", value.replace('"', "\"\""))
+    } else {
+        value.to_owned()
+    }
+}
+
+/// Text as it stands in HTML.
+fn escaped(text: &str) -> String {
+    let text = text.replace('&', "&amp;").replace('<', "&lt;");
+    text.replace('>', "&gt;").replace('"', "&quot;")
+}
+
+const STYLE: &str = "
+:root { color-scheme: light dark; font: 15px system-ui, sans-serif; }
+body { margin: 2rem auto; max-width: 75rem; padding: 0 1rem; }
+table { border-collapse: collapse; width: 100%; }
+th, td { text-align: left; padding: .3rem .6rem; border-bottom: 1px solid #8884; vertical-align: middle; }
+img { width: 18rem; height: 4.5rem; object-fit: contain; }
+.failed { color: #c0392b; } .doubt { color: #b9770e; } .number { text-align: right; }
+";
+
+/// A table with a picture of each run, which leads to its page.
+fn page(batch: &Batch, out: &mut dyn Write) -> io::Result<()> {
+    let title = batch.path.file_stem().unwrap_or_default().to_string_lossy();
+    let title = escaped(&title);
+    writeln!(
+        out,
+        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{title}</title><style>{STYLE}</style>\
+         </head><body><h1>{title}</h1><p>{} jobs of {}</p><table><thead><tr><th>run</th><th>surfaces</th><th>state</th>\
+         <th class=\"number\">seconds</th><th class=\"number\">consistency</th><th>said</th></tr></thead><tbody>",
+        batch.jobs.len(),
+        escaped(&batch.path.display().to_string())
+    )?;
+    for job in statuses(batch) {
+        let name = escaped(&job.name);
+        let run = batch.folder.join(&job.name);
+        let there = |file: &str| run.join(file).is_file();
+        let linked = match there("report.html") {
+            true => format!("<a href=\"{name}/report.html\">{name}</a>"),
+            false => name.clone(),
+        };
+        let picture = match there("meshes/preview.png") {
+            true => format!(
+                "<img loading=\"lazy\" alt=\"surfaces of {name}\" src=\"{name}/meshes/preview.png\">"
+            ),
+            false => String::new(),
+        };
+        let number = |value: Option<f64>| value.map_or_else(String::new, crate::event::significant);
+        let mut said = String::new();
+        if let RunState::Failed { reason } = &job.run.state {
+            write!(said, "<span class=\"failed\">{}</span>", escaped(reason))
+                .map_err(io::Error::other)?;
+        }
+        for doubt in &job.run.doubts {
+            write!(said, "<div class=\"doubt\">{}</div>", escaped(doubt))
+                .map_err(io::Error::other)?;
+        }
+        writeln!(
+            out,
+            "<tr><td>{linked}</td><td>{picture}</td><td>{}</td><td class=\"number\">{}</td><td class=\"number\">{}</td>\
+             <td>{said}</td></tr>",
+            word(&job.run.state),
+            number(job.run.wall_seconds),
+            number(job.run.consistency)
+        )?;
+    }
+    writeln!(out, "</tbody></table></body></html>")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fields_are_quoted_where_they_must_be() {
+        assert_eq!(quoted("a-b"), "a-b");
+        assert_eq!(quoted("a, \"b\""), "\"a, \"\"b\"\"\"");
+        assert_eq!(escaped("<a & \"b\">"), "&lt;a &amp; &quot;b&quot;&gt;");
+    }
+}
