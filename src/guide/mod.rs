@@ -5,6 +5,7 @@
 //! | [`first_steps`] | from nothing to a first result, and what to look at |
 //! | [`worked_jobs`] | three jobs from files to an animation, with commands, pictures and times |
 //! | [`sequences`] | one motion through three shapes and more |
+//! | [`many_runs`] | thousands of pairs: on one machine, and on a cluster with Slurm |
 //! | [`shapes`] | files, normals, correspondences, coordinates |
 //! | [`recipes`] | the settings of a run: presets, sections, the ten keys that people change |
 //! | [`results`] | what a run leaves, how to measure it, and how good the method is |
@@ -34,6 +35,11 @@ pub mod worked_jobs {
 pub mod sequences {
     #![doc = include_str!("links.txt")]
     #![doc = include_str!("sequences.md")]
+}
+
+pub mod many_runs {
+    #![doc = include_str!("links.txt")]
+    #![doc = include_str!("many_runs.md")]
 }
 
 pub mod shapes {
