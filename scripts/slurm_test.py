@@ -221,7 +221,7 @@ def digest(run: Path) -> str:
 
 def killed_twice(binary: str, jobs: Path) -> None:
     """The same jobs on this machine, killed in the middle twice."""
-    command = [binary, "batch", "run", str(jobs), "--at-a-time", "2", "--quiet"]
+    command = [binary, "batch", "run", str(jobs), "--jobs", "2", "--quiet"]
     for seconds in (3, 5, None):
         work = subprocess.Popen(command, start_new_session=True)
         try:

@@ -1,4 +1,4 @@
-//! The figures of all runs of a batch: as CSV and JSON for programs, as a page for people.
+//! The figures of all runs of a batch: as CSV, JSON and Parquet for programs, as a page for people.
 
 use std::fmt::Write as _;
 use std::io::{self, Write};
@@ -6,6 +6,7 @@ use std::path::PathBuf;
 
 use serde_json::Value;
 
+use super::figures::{Cell, write_parquet};
 use super::jobs::Batch;
 use super::table::{JobStatus, statuses};
 use crate::atomic::write_atomically;
@@ -21,8 +22,8 @@ pub struct Collected {
     pub done: usize,
     /// Those that failed.
     pub failed: usize,
-    /// `results.csv`, `results.json` and `index.html`.
-    pub files: [PathBuf; 3],
+    /// `results.csv`, `results.json`, `results.parquet` and `index.html`.
+    pub files: [PathBuf; 4],
 }
 
 /// The columns of the CSV.
@@ -45,25 +46,34 @@ const COLUMNS: [&str; 16] = [
     "reason",
 ];
 
-/// Writes the figures of all jobs into the folder of the batch. Runs are read one after the other, and no more than one
-/// is held.
+/// Writes the figures of all jobs into the folder of the batch. Of each run no more than its row is held.
 ///
 /// # Errors
 /// The folder cannot be written.
 pub fn collect(batch: &Batch) -> Result<Collected> {
     std::fs::create_dir_all(&batch.folder)?;
-    let files = ["results.csv", "results.json", "index.html"].map(|name| batch.folder.join(name));
+    let files = [
+        "results.csv",
+        "results.json",
+        "results.parquet",
+        "index.html",
+    ];
+    let files = files.map(|name| batch.folder.join(name));
     let (mut done, mut failed) = (0, 0);
+    let mut rows = Vec::with_capacity(batch.jobs.len());
+    for job in statuses(batch) {
+        done += usize::from(job.run.state == RunState::Done);
+        failed += usize::from(matches!(job.run.state, RunState::Failed { .. }));
+        rows.push(row(batch, &job));
+    }
     write_atomically(&files[0], |csv| {
         writeln!(csv, "{}", COLUMNS.join(","))?;
-        for job in statuses(batch) {
-            done += usize::from(job.run.state == RunState::Done);
-            failed += usize::from(matches!(job.run.state, RunState::Failed { .. }));
-            let row = row(batch, &job).map(|value| quoted(&value));
-            writeln!(csv, "{}", row.join(","))?;
+        for row in &rows {
+            writeln!(csv, "{}", row.each_ref().map(Cell::field).join(","))?;
         }
         Ok(())
     })?;
+    write_atomically(&files[2], |out| write_parquet(&COLUMNS, &rows, out))?;
     write_atomically(&files[1], |out| {
         let mut before = "[\n";
         for job in statuses(batch) {
@@ -74,7 +84,7 @@ pub fn collect(batch: &Batch) -> Result<Collected> {
         }
         writeln!(out, "\n]")
     })?;
-    write_atomically(&files[2], |out| page(batch, out))?;
+    write_atomically(&files[3], |out| page(batch, out))?;
     Ok(Collected {
         jobs: batch.jobs.len(),
         done,
@@ -91,30 +101,29 @@ fn evaluation(batch: &Batch, job: &JobStatus) -> Option<Value> {
     Some(value["mean"].take())
 }
 
-fn row(batch: &Batch, job: &JobStatus) -> [String; 16] {
-    fn text<T: ToString>(value: Option<T>) -> String {
-        value.map_or_else(String::new, |value| value.to_string())
-    }
+fn row(batch: &Batch, job: &JobStatus) -> [Cell; 16] {
     let run = &job.run;
+    let text = |text: &str| Cell::Text(text.to_owned());
+    let count = |count: usize| Cell::Count(Some(count as u64));
     let mean = evaluation(batch, job).unwrap_or(Value::Null);
-    let measured = |of: &str, key: &str| text(mean[of][key].as_f64());
+    let measured = |of: &str, key: &str| Cell::Number(mean[of][key].as_f64());
     [
-        job.name.clone(),
-        job.files[0].clone(),
-        job.files[1].clone(),
-        word(&run.state).to_owned(),
-        run.step.to_string(),
-        text(run.steps),
-        text(run.seconds),
-        text(run.wall_seconds),
-        text(run.peak_memory_bytes),
-        text(run.total),
-        run.surfaces.to_string(),
-        text(run.consistency),
+        text(&job.name),
+        text(&job.files[0]),
+        text(&job.files[1]),
+        text(word(&run.state)),
+        count(run.step),
+        Cell::Count(run.steps.map(|steps| steps as u64)),
+        Cell::Number(run.seconds),
+        Cell::Number(run.wall_seconds),
+        Cell::Count(run.peak_memory_bytes),
+        Cell::Number(run.total),
+        count(run.surfaces),
+        Cell::Number(run.consistency),
         measured("surface", "chamfer"),
         measured("carried", "tracked_rmse"),
-        run.doubts.len().to_string(),
-        reason(&run.state).to_owned(),
+        count(run.doubts.len()),
+        text(reason(&run.state)),
     ]
 }
 
@@ -137,15 +146,6 @@ fn reason(state: &RunState) -> &str {
     }
 }
 
-/// A field of a CSV (RFC 4180).
-fn quoted(value: &str) -> String {
-    if value.contains([',', '"', '\n', '\r']) {
-        format!("\"{}\"", value.replace('"', "\"\""))
-    } else {
-        value.to_owned()
-    }
-}
-
 /// Text as it stands in HTML.
 fn escaped(text: &str) -> String {
     let text = text.replace('&', "&amp;").replace('<', "&lt;");
@@ -156,6 +156,7 @@ const STYLE: &str = "
 :root { color-scheme: light dark; font: 15px system-ui, sans-serif; }
 body { margin: 2rem auto; max-width: 75rem; padding: 0 1rem; }
 table { border-collapse: collapse; width: 100%; }
+td:first-child { white-space: nowrap; }
 th, td { text-align: left; padding: .3rem .6rem; border-bottom: 1px solid #8884; vertical-align: middle; }
 img { width: 18rem; height: 4.5rem; object-fit: contain; }
 .failed { color: #c0392b; } .doubt { color: #b9770e; } .number { text-align: right; }
@@ -214,9 +215,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn fields_are_quoted_where_they_must_be() {
-        assert_eq!(quoted("a-b"), "a-b");
-        assert_eq!(quoted("a, \"b\""), "\"a, \"\"b\"\"\"");
+    fn text_stays_text() {
         assert_eq!(escaped("<a & \"b\">"), "&lt;a &amp; &quot;b&quot;&gt;");
     }
 }

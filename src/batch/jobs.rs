@@ -80,6 +80,8 @@ enum Shapes {
 pub struct Job {
     /// Its name, which no other job of the batch has; stays the same as long as its files do.
     pub name: String,
+    /// Whether the file gives the name.
+    is_named: bool,
     shapes: Shapes,
     correspondences: Option<String>,
     set: Vec<String>,
@@ -164,6 +166,7 @@ impl Batch {
                 for target in files[i + 1..].iter().take(reaches) {
                     jobs.push(Job {
                         name: pair_name(source, target, stem),
+                        is_named: false,
                         shapes: Shapes::Pair([source.clone(), target.clone()]),
                         correspondences: group.correspondences.clone(),
                         set: Vec::new(),
@@ -295,6 +298,7 @@ impl JobEntry {
             (None, None, Some(sequence)) => Shapes::Sequence(place.join(sequence), self.keys),
             _ => return Err("give source and target, or a sequence".to_owned()),
         };
+        let is_named = self.name.is_some();
         let name = self.name.unwrap_or_else(|| match &shapes {
             Shapes::Pair([source, target]) => pair_name(source, target, stem),
             Shapes::Sequence(path, _) => plain(&stem(path)),
@@ -307,6 +311,7 @@ impl JobEntry {
         }
         Ok(Job {
             name,
+            is_named,
             shapes,
             correspondences: self.correspondences,
             set: self.set,
@@ -338,7 +343,7 @@ fn tell_apart(jobs: &mut [Job]) -> std::result::Result<(), String> {
     };
     let counts = count(jobs);
     for job in jobs.iter_mut().filter(|job| counts[&job.name] > 1) {
-        if let Shapes::Pair([source, target]) = &job.shapes {
+        if let (Shapes::Pair([source, target]), false) = (&job.shapes, job.is_named) {
             job.name = pair_name(source, target, |path| {
                 let folder = path.parent().and_then(Path::file_name).unwrap_or_default();
                 format!("{}_{}", folder.to_string_lossy(), stem(path))

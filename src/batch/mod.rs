@@ -5,13 +5,15 @@
 //! | `jobs.rs` | reads the file: pairs, sequences, all pairs of some files, each with the next |
 //! | `run.rs` | works through the jobs, each in a process of its own, some at a time |
 //! | `table.rs` | where all jobs stand, and what the rest will take |
-//! | `collect.rs` | the figures of all runs as CSV, JSON and a page |
+//! | `collect.rs` | the figures of all runs as CSV, JSON, Parquet and a page |
+//! | `figures.rs` | a row of them, and rows as files |
 //! | `slurm.rs` | the script of a Slurm job array |
 //!
 //! Nothing about a job is kept but its run folder, and for one that could not even begin, a line in `errors/`. So a
 //! batch may be stopped, killed, extended and started again, on any number of machines that share the folder.
 
 mod collect;
+mod figures;
 mod jobs;
 mod run;
 mod slurm;

@@ -50,7 +50,7 @@ struct RunArgs {
     jobs: PathBuf,
 
     /// Jobs at a time [default: one for each two cores, as far as memory lasts; one on a GPU]
-    #[arg(long, short = 'n', value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024))]
+    #[arg(long = "jobs", short = 'n', value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024))]
     at_a_time: Option<u32>,
 
     /// Only every N-th job, from job I (counted from 0) on: the share of one task of an array
@@ -75,7 +75,7 @@ struct StatusArgs {
     json: bool,
 }
 
-/// Gather the figures of all runs: results.csv, results.json, and index.html with a picture of each
+/// Gather the figures of all runs: results.csv, .json and .parquet, and index.html with a picture of each
 #[derive(Debug, Args)]
 struct CollectArgs {
     /// The file of jobs, TOML
@@ -90,6 +90,10 @@ struct CollectArgs {
 struct SubmitArgs {
     /// The file of jobs, TOML
     jobs: PathBuf,
+
+    /// The kind of cluster; there is this one
+    #[arg(long, default_value_t = true)]
+    slurm: bool,
 
     /// Print the script, and submit nothing
     #[arg(long)]
@@ -362,18 +366,22 @@ fn status(args: &StatusArgs) -> Result {
 fn gather(args: &CollectArgs) -> Result {
     let batch = Batch::read(&args.jobs)?;
     let found = collect(&batch)?;
-    let [csv, json, page] = found.files.each_ref().map(|path| path.display());
-    print(&format!(
-        "{} jobs, {} done, {} failed\n{csv}\n{json}\n{page}\n",
+    let mut text = format!(
+        "{} jobs, {} done, {} failed\n",
         found.jobs, found.done, found.failed
-    ))
+    );
+    for file in &found.files {
+        text += &format!("{}\n", file.display());
+    }
+    print(&text)
 }
 
 fn submit(args: &SubmitArgs) -> Result {
     let batch = Batch::read(&args.jobs)?;
     batch.recipe(&batch.jobs[0])?;
     let mut command = command_of_job(&batch, &args.place, &["run"])?;
-    command.extend(["--at-a-time", "1", "--quiet"].map(str::to_owned));
+    command.extend(["--jobs", "1", "--quiet"].map(str::to_owned));
+    debug_assert!(args.slurm, "a flag that is set stays set");
     let slurm = Slurm {
         array_size: args.array_size as usize,
         throttle: args.throttle,

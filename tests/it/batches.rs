@@ -109,6 +109,8 @@ fn all_pairs_are_done_once_and_one_that_fails_stops_nothing() {
             .all(|line| line.contains(",done,18,18,")),
         "{csv}"
     );
+    let columns = fs::read(place.path("out/results.parquet")).expect("a file");
+    assert!(columns.starts_with(b"PAR1") && columns.ends_with(b"PAR1"));
     let listed = json(&place.path("out/results.json"));
     assert_eq!(listed.as_array().map(Vec::len), Some(7));
     let page = fs::read_to_string(place.path("out/index.html")).expect("a page");
