@@ -6,9 +6,10 @@
 Starts munge, a controller and three nodes on this machine, in a folder of their own, and ends them. It needs the
 packages slurm-wlm and munge, and root. Then:
 
-1. the 45 pairs are submitted as an array of nine tasks with a time limit that each task meets, so that it ends with a
-   checkpoint and puts itself into the queue again;
-2. a node is killed with its tasks, and later the controller, which is started again;
+1. the 45 pairs are submitted as an array of nine tasks; those that run receive the signal that comes shortly before a
+   time limit, so that each ends with a checkpoint and puts itself into the queue again;
+2. a node is killed with its tasks, and later the controller, which is started again; Slurm then holds tasks back that it
+   finds twice, or forgets them, and the same command submits what is left;
 3. a second array is cancelled, and must stay so;
 4. at the end every run must be done, and its field and its surfaces equal, to the last bit, to those of
    `isomorph batch run` on the same jobs, which was killed twice itself.
@@ -193,7 +194,7 @@ def write_jobs(folder: Path, name: str) -> Path:
         "data.points": 1000,
         "data.correspondences": "same-vertices",
         "spline.band": 3000,
-        "training.steps": 60,
+        "training.steps": 40,
         "checkpoint.every": 5,
     }
     listed = ", ".join(f'"{key}={value}"' for key, value in keys.items())
@@ -212,11 +213,36 @@ def done(binary: str, jobs: Path) -> int:
     return sum(job["state"] == "done" for job in states(binary, jobs))
 
 
+def logs(jobs: Path) -> str:
+    """What the tasks of an array have said."""
+    files = (jobs.parent / jobs.stem / "slurm").glob("*.log")
+    return "".join(file.read_text() for file in files)
+
+
 def digest(run: Path) -> str:
     """Of what a run has found: its field, and its surfaces."""
     newest = sorted((run / "checkpoints").iterdir())[-1]
     files = [newest / "velocity.mpk", *sorted((run / "meshes").glob("*.ply"))]
     return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
+
+
+def finish(cluster: Cluster, binary: str, jobs: Path, submit: list[str]) -> None:
+    """Waits for all runs. Where Slurm has nothing to do any more and runs are left, they are submitted again."""
+    end = time.monotonic() + 240
+    idle = 0
+    while done(binary, jobs) < 45:
+        if time.monotonic() > end:
+            print(cluster.call("squeue", "-r", check=False), flush=True)
+            raise SystemExit("not so after 240 s: all runs are done")
+        # Held back: "launch failed requeued held"; those that merely wait have other reasons.
+        listed = cluster.call("squeue", "-h", "-r", "-o", "%t %r", check=False).splitlines()
+        busy = [line for line in listed if "held" not in line]
+        idle = 0 if busy else idle + 1
+        if idle == 4:
+            cluster.call("scancel", "--user=root", check=False)
+            print("again:", cluster.call(*submit), end="", flush=True)
+            idle = 0
+        time.sleep(1)
 
 
 def killed_twice(binary: str, jobs: Path) -> None:
@@ -254,21 +280,21 @@ def main(words: list[str]) -> int:
         try:
             cluster.start()
             said("Slurm runs")
-            # A task ends with a checkpoint 20 seconds before its limit of a minute.
-            limits = ["--array-size", "9", "--time", "1", "--grace", "40", "--cpus", "1"]
+            limits = ["--array-size", "9", "--time", "10", "--grace", "60", "--cpus", "1"]
             submit = [options.binary, "batch", "submit"]
             print(cluster.call(*submit, str(there), *limits), end="", flush=True)
             until("a few runs are done", 60, lambda: done(options.binary, there) >= 3)
+            running = [line.split()[0] for line in cluster.queue() if line.endswith(" R")]
+            cluster.call("scancel", "--batch", "--signal=USR1", *running, check=False)
+            said(f"{len(running)} tasks were signalled as before their time limits")
+            until("a task has ended with a checkpoint", 60, lambda: "JOB REQUEUE" in logs(there))
             cluster.kill_node("n1")
             said("node n1 was killed with its tasks")
             time.sleep(4)
             cluster.kill_controller()
             said("the controller was killed and started again")
             cluster.call("slurmd", "-N", "n1")
-            until("all runs are done", 300, lambda: done(options.binary, there) == 45)
-            logs = "".join(log.read_text() for log in (folder / "there/slurm").glob("*.log"))
-            if "JOB REQUEUE" not in logs:
-                raise SystemExit("no task met its time limit: make the runs longer")
+            finish(cluster, options.binary, there, [*submit, str(there), *limits])
             said("all 45 runs are done")
             cluster.call("scancel", "--user=root", check=False)
             print(cluster.call(*submit, str(cancelled), *limits), end="", flush=True)
@@ -284,6 +310,9 @@ def main(words: list[str]) -> int:
             if cluster.queue() or done(options.binary, cancelled) != count or count == 45:
                 raise SystemExit("a cancelled array went on")
             said(f"the second array stays cancelled, with {count} runs done")
+        except SystemExit:
+            print(cluster.call("squeue", "-r", check=False), flush=True)
+            raise
         finally:
             cluster.end()
         killed_twice(options.binary, here)

@@ -225,9 +225,11 @@ fn plan(args: &PlanArgs) -> Result {
     print(&text)
 }
 
-/// Cores of this machine.
+/// Cores of this machine, or of the task that this is of a Slurm job: not all sites bind tasks to their cores.
 fn cores() -> usize {
-    std::thread::available_parallelism().map_or(1, usize::from)
+    let of_task = std::env::var("SLURM_CPUS_PER_TASK").ok();
+    let of_task = of_task.and_then(|text| text.parse().ok());
+    of_task.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
 }
 
 /// Jobs at a time where nothing else is asked for: a step gains little from more than two cores.

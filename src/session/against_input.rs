@@ -247,7 +247,7 @@ mod tests {
             let polar = std::f32::consts::PI * (k / around) as f32 / rings as f32;
             let angle = std::f32::consts::TAU * (k % around) as f32 / around as f32;
             // Exactly on the axis at the poles.
-            let ring = if k / around % rings == 0 {
+            let ring = if (k / around).is_multiple_of(rings) {
                 0.0
             } else {
                 polar.sin()
