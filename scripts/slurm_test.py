@@ -98,6 +98,11 @@ class Cluster:
         subprocess.run(
             ["install", "-d", "-o", "munge", "-g", "munge", "-m", "755", "/run/munge"], check=True
         )
+        key = Path("/etc/munge/munge.key")
+        if not key.exists():
+            key.write_bytes(os.urandom(1024))
+            key.chmod(0o400)
+            shutil.chown(key, "munge", "munge")
         if subprocess.run(["pidof", "munged"], capture_output=True, check=False).returncode:
             user = ["runuser", "-u", "munge", "--"]
             command = [*user, "/usr/sbin/munged", "--foreground"]
