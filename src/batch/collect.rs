@@ -1,6 +1,5 @@
 //! The figures of all runs of a batch: as CSV, JSON and Parquet for programs, as a page for people.
 
-use std::fmt::Write as _;
 use std::io::{self, Write};
 use std::path::PathBuf;
 
@@ -46,7 +45,7 @@ const COLUMNS: [&str; 16] = [
     "reason",
 ];
 
-/// Writes the figures of all jobs into the folder of the batch. Of each run no more than its row is held.
+/// Writes the figures of all jobs into the folder of the batch. Each run is read once, and of each no more than its rows are held.
 ///
 /// # Errors
 /// The folder cannot be written.
@@ -61,10 +60,16 @@ pub fn collect(batch: &Batch) -> Result<Collected> {
     let files = files.map(|name| batch.folder.join(name));
     let (mut done, mut failed) = (0, 0);
     let mut rows = Vec::with_capacity(batch.jobs.len());
+    let (mut objects, mut shown) = (Vec::new(), Vec::new());
     for job in statuses(batch) {
         done += usize::from(job.run.state == RunState::Done);
         failed += usize::from(matches!(job.run.state, RunState::Failed { .. }));
-        rows.push(row(batch, &job));
+        let mean = evaluation(batch, &job).unwrap_or(Value::Null);
+        rows.push(row(&job, &mean));
+        shown.push(shown_row(batch, &job));
+        let mut object = serde_json::to_value(&job)?;
+        object["evaluation"] = mean;
+        objects.push(object.to_string());
     }
     write_atomically(&files[0], |csv| {
         writeln!(csv, "{}", COLUMNS.join(","))?;
@@ -75,16 +80,9 @@ pub fn collect(batch: &Batch) -> Result<Collected> {
     })?;
     write_atomically(&files[2], |out| write_parquet(&COLUMNS, &rows, out))?;
     write_atomically(&files[1], |out| {
-        let mut before = "[\n";
-        for job in statuses(batch) {
-            let mut value = serde_json::to_value(&job).map_err(io::Error::other)?;
-            value["evaluation"] = evaluation(batch, &job).unwrap_or(Value::Null);
-            write!(out, "{before}{value}")?;
-            before = ",\n";
-        }
-        writeln!(out, "\n]")
+        writeln!(out, "[\n{}\n]", objects.join(",\n"))
     })?;
-    write_atomically(&files[3], |out| page(batch, out))?;
+    write_atomically(&files[3], |out| page(batch, &shown, out))?;
     Ok(Collected {
         jobs: batch.jobs.len(),
         done,
@@ -101,11 +99,10 @@ fn evaluation(batch: &Batch, job: &JobStatus) -> Option<Value> {
     Some(value["mean"].take())
 }
 
-fn row(batch: &Batch, job: &JobStatus) -> [Cell; 16] {
+fn row(job: &JobStatus, mean: &Value) -> [Cell; 16] {
     let run = &job.run;
     let text = |text: &str| Cell::Text(text.to_owned());
     let count = |count: usize| Cell::Count(Some(count as u64));
-    let mean = evaluation(batch, job).unwrap_or(Value::Null);
     let measured = |of: &str, key: &str| Cell::Number(mean[of][key].as_f64());
     [
         text(&job.name),
@@ -163,7 +160,7 @@ img { width: 18rem; height: 4.5rem; object-fit: contain; }
 ";
 
 /// A table with a picture of each run, which leads to its page.
-fn page(batch: &Batch, out: &mut dyn Write) -> io::Result<()> {
+fn page(batch: &Batch, rows: &[String], out: &mut dyn Write) -> io::Result<()> {
     let title = batch.path.file_stem().unwrap_or_default().to_string_lossy();
     let title = escaped(&title);
     writeln!(
@@ -174,40 +171,42 @@ fn page(batch: &Batch, out: &mut dyn Write) -> io::Result<()> {
         batch.jobs.len(),
         escaped(&batch.path.display().to_string())
     )?;
-    for job in statuses(batch) {
-        let name = escaped(&job.name);
-        let run = batch.folder.join(&job.name);
-        let there = |file: &str| run.join(file).is_file();
-        let linked = match there("report.html") {
-            true => format!("<a href=\"{name}/report.html\">{name}</a>"),
-            false => name.clone(),
-        };
-        let picture = match there("meshes/preview.png") {
-            true => format!(
-                "<img loading=\"lazy\" alt=\"surfaces of {name}\" src=\"{name}/meshes/preview.png\">"
-            ),
-            false => String::new(),
-        };
-        let number = |value: Option<f64>| value.map_or_else(String::new, crate::event::significant);
-        let mut said = String::new();
-        if let RunState::Failed { reason } = &job.run.state {
-            write!(said, "<span class=\"failed\">{}</span>", escaped(reason))
-                .map_err(io::Error::other)?;
-        }
-        for doubt in &job.run.doubts {
-            write!(said, "<div class=\"doubt\">{}</div>", escaped(doubt))
-                .map_err(io::Error::other)?;
-        }
-        writeln!(
-            out,
-            "<tr><td>{linked}</td><td>{picture}</td><td>{}</td><td class=\"number\">{}</td><td class=\"number\">{}</td>\
-             <td>{said}</td></tr>",
-            word(&job.run.state),
-            number(job.run.wall_seconds),
-            number(job.run.consistency)
-        )?;
+    for row in rows {
+        writeln!(out, "{row}")?;
     }
     writeln!(out, "</tbody></table></body></html>")
+}
+
+/// The row of a run on the page.
+fn shown_row(batch: &Batch, job: &JobStatus) -> String {
+    let name = escaped(&job.name);
+    let run = batch.folder.join(&job.name);
+    let there = |file: &str| run.join(file).is_file();
+    let linked = match there("report.html") {
+        true => format!("<a href=\"{name}/report.html\">{name}</a>"),
+        false => name.clone(),
+    };
+    let picture = match there("meshes/preview.png") {
+        true => format!(
+            "<img loading=\"lazy\" alt=\"surfaces of {name}\" src=\"{name}/meshes/preview.png\">"
+        ),
+        false => String::new(),
+    };
+    let number = |value: Option<f64>| value.map_or_else(String::new, crate::event::significant);
+    let mut said = String::new();
+    if let RunState::Failed { reason } = &job.run.state {
+        said += &format!("<span class=\"failed\">{}</span>", escaped(reason));
+    }
+    for doubt in &job.run.doubts {
+        said += &format!("<div class=\"doubt\">{}</div>", escaped(doubt));
+    }
+    format!(
+        "<tr><td>{linked}</td><td>{picture}</td><td>{}</td><td class=\"number\">{}</td><td class=\"number\">{}</td>\
+         <td>{said}</td></tr>",
+        word(&job.run.state),
+        number(job.run.wall_seconds),
+        number(job.run.consistency)
+    )
 }
 
 #[cfg(test)]

@@ -1,3 +1,5 @@
+//! Files of jobs: what they say, and what is refused.
+
 use super::*;
 
 /// A file of jobs in a folder with these files.

@@ -75,25 +75,10 @@ pub struct Ended {
 /// # Errors
 /// Those of [`Session`]; a run of another recipe in its folder.
 pub fn run_one(batch: &Batch, job: &Job, backend: Backend, stop: StopFlag) -> Result<()> {
-    let folder = batch.run(job);
-    let recipe = batch.recipe(job)?;
-    let status = run_status(&folder)?;
-    let session = match status.state {
-        RunState::Done => return Ok(()),
-        RunState::Waiting => Session::prepare(recipe, &folder, backend)?,
-        _ => {
-            let session = Session::resume(&folder, &[], backend)?;
-            if let Some(change) = session.recipe().changes(&recipe).first() {
-                return Err(Error::usage(format!(
-                    "{}: is a run of another recipe ({change}); delete it, or name another folder in {}",
-                    folder.display(),
-                    batch.path.display()
-                )));
-            }
-            session
-        }
-    };
-    session.stopped_by(stop).train(|_| {})?;
+    let session = Session::begin_or_go_on(batch.recipe(job)?, batch.run(job), backend)?;
+    if let Some(session) = session {
+        session.stopped_by(stop).train(|_| {})?;
+    }
     Ok(())
 }
 

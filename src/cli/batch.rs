@@ -11,7 +11,7 @@ use isomorph::batch::{
 use isomorph::event::duration;
 use isomorph::status::RunState;
 
-use super::{BackendArgs, Failure, QuietArgs, Result, print, stop_on_interrupt};
+use super::{BackendArgs, DEFAULT_BACKEND, Failure, QuietArgs, Result, print, stop_on_interrupt};
 
 /// Many runs from one file of jobs: on this machine, or as a Slurm job array
 ///
@@ -200,7 +200,7 @@ fn plan(args: &PlanArgs) -> Result {
     // What is wrong with a key is wrong with the first recipe already.
     let first = batch.recipe(&batch.jobs[0])?;
     let found = estimate(&batch);
-    let at_a_time = at_a_time(&batch, "flex", None);
+    let at_a_time = at_a_time(found.memory_bytes, DEFAULT_BACKEND);
     let by = if found.is_measured {
         "by those that are done"
     } else {
@@ -233,15 +233,12 @@ fn cores() -> usize {
 }
 
 /// Jobs at a time where nothing else is asked for: a step gains little from more than two cores.
-fn at_a_time(batch: &Batch, backend: &str, wanted: Option<u32>) -> usize {
-    if let Some(wanted) = wanted {
-        return wanted as usize;
-    }
+fn at_a_time(memory_bytes: Option<u64>, backend: &str) -> usize {
     if backend == "wgpu" {
         return 1;
     }
     let by_cores = (cores() / 2).max(1);
-    let memory = estimate(batch).memory_bytes.zip(available_memory());
+    let memory = memory_bytes.zip(available_memory());
     let by_memory = memory.map_or(by_cores, |(each, all)| (all / each.max(1)) as usize);
     by_cores.min(by_memory).max(1)
 }
@@ -278,7 +275,10 @@ fn work(args: &RunArgs) -> Result {
     batch.recipe(&batch.jobs[0])?;
     let options = RunBatch {
         command: command_of_job(&batch, &args.place, &["job"])?,
-        at_a_time: at_a_time(&batch, &args.place.backend, args.at_a_time),
+        at_a_time: match args.at_a_time {
+            Some(wanted) => wanted as usize,
+            None => at_a_time(estimate(&batch).memory_bytes, &args.place.backend),
+        },
         cores: cores(),
         share: args.share.unwrap_or(Share::ALL),
     };

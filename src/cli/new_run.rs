@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use isomorph::status::{RunState, run_status};
 use isomorph::{Event, Recipe, Session};
 
 use super::view::show;
@@ -53,21 +52,13 @@ impl NewRunArgs {
     }
 
     /// Goes on with the run of this recipe in a folder; nothing is done if it is finished.
-    pub(super) fn go_on(&self, recipe: &Recipe, folder: &Path) -> Result<Option<PathBuf>> {
-        let session = Session::resume(folder, &[], self.place.backend()?)?;
-        let changes = session.recipe().changes(recipe);
-        if let Some(change) = changes.first() {
-            return Err(Failure::Usage(format!(
-                "{}: is a run of another recipe ({change}); choose another folder with --run",
-                folder.display()
-            )));
-        }
-        if run_status(folder)?.state == RunState::Done {
+    pub(super) fn go_on(&self, recipe: Recipe, folder: &Path) -> Result<Option<PathBuf>> {
+        let Some(session) = Session::begin_or_go_on(recipe, folder, self.place.backend()?)? else {
             if self.progress.is_for_people() {
                 eprintln!("{}: is finished already", folder.display());
             }
             return Ok(None);
-        }
+        };
         self.watched(session.stopped_by(stop_on_interrupt()), folder, |_| {})
     }
 

@@ -34,8 +34,8 @@ pub(super) fn run(args: TrainArgs) -> Result {
     let recipe =
         Recipe::read(&args.recipe, &args.new.set.overrides).map_err(isomorph::Error::from)?;
     let folder = args.run.unwrap_or_else(|| default_run(&args.recipe));
-    if args.resume_if_exists && is_run(&folder) {
-        let page = args.new.go_on(&recipe, &folder)?;
+    if args.resume_if_exists {
+        let page = args.new.go_on(recipe, &folder)?;
         args.new.open(page.as_deref());
         return Ok(());
     }

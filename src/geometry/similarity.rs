@@ -52,6 +52,11 @@ impl Similarity {
     }
 }
 
+/// The angle of a rotation in radians, 0 to pi.
+pub(crate) fn angle_of([a, b, c]: &Matrix) -> f64 {
+    ((a[0] + b[1] + c[2] - 1.0) / 2.0).clamp(-1.0, 1.0).acos()
+}
+
 /// A rotation as a unit quaternion, its real part first.
 pub(crate) type Quaternion = [f64; 4];
 

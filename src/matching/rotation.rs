@@ -9,6 +9,7 @@ use crate::geometry::linear::{
     IDENTITY, Matrix, add, add_outer, cross, difference, dot, mean, scaled, symmetric_eigen, times,
     transposed,
 };
+use crate::geometry::similarity::angle_of;
 
 /// `x -> rotation x + translation`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,8 +44,7 @@ impl RigidMotion {
 
     /// The angle of the rotation in radians, 0 to pi.
     pub(crate) fn angle(&self) -> f64 {
-        let [a, b, c] = self.rotation;
-        ((a[0] + b[1] + c[2] - 1.0) / 2.0).clamp(-1.0, 1.0).acos()
+        angle_of(&self.rotation)
     }
 
     /// The motion with the least `sum |R x_k + t - y_k|^2` over pairs `(x_k, y_k)`; the identity of

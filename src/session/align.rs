@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::event::significant;
 use crate::geometry::Extent;
 use crate::geometry::linear::{difference, length, mean, scaled};
-use crate::geometry::similarity::Similarity;
+use crate::geometry::similarity::{Similarity, angle_of};
 use crate::matching::{RigidMotion, rigid_motion};
 use crate::recipe::{self, Align, Recipe};
 use crate::shape::{Correspondences, Shape};
@@ -89,7 +89,7 @@ fn said([source, target]: [&Shape; 2], onto: &Similarity, recipe: &Recipe) -> St
     if onto.scale != 1.0 {
         parts.push(format!("scaled by {}", significant(onto.scale)));
     }
-    let angle = angle_of(onto).to_degrees();
+    let angle = angle_of(&onto.rotation).to_degrees();
     if angle > 0.05 {
         parts.push(format!("turned by {angle:.1} degrees"));
     }
@@ -207,17 +207,11 @@ fn unit_ratio(ratio: f64) -> f64 {
 
 /// Whether a motion is one that "auto" takes out.
 fn is_large(motion: &Similarity, sized: &Similarity, source: &Shape, target: &Shape) -> bool {
-    let angle = angle_of(motion);
+    let angle = angle_of(&motion.rotation);
     let centre = sized.apply(mean(target.mesh.vertices.iter().copied()));
     let shift = length(difference(motion.apply(centre), centre));
     let size = Extent::of_surface(&source.mesh).diagonal();
     angle.to_degrees() > TURN || shift > SHIFT * size
-}
-
-/// The angle of its turn, in radians.
-fn angle_of(motion: &Similarity) -> f64 {
-    let [a, b, c] = motion.rotation;
-    ((a[0] + b[1] + c[2] - 1.0) / 2.0).clamp(-1.0, 1.0).acos()
 }
 
 #[cfg(test)]

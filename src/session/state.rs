@@ -9,7 +9,10 @@ use super::checkpoint;
 use super::folder::RunFolder;
 use super::lock;
 use super::metrics::{self, Metrics};
-use crate::error::Result;
+use super::train::Session;
+use crate::backend::Backend;
+use crate::error::{Error, Result};
+use crate::recipe::Recipe;
 use crate::surface::frames::FrameEntry;
 
 /// The file that says why training failed; it goes when training begins again.
@@ -77,6 +80,35 @@ impl RunStatus {
             surfaces: 0,
             consistency: None,
             doubts: Vec::new(),
+        }
+    }
+}
+
+impl Session {
+    /// A new run of a recipe, or the run of that recipe that is in the folder; `None` if it is finished.
+    ///
+    /// # Errors
+    /// Those of [`Session::prepare`] and [`Session::resume`]; a run of another recipe.
+    pub fn begin_or_go_on(
+        recipe: Recipe,
+        folder: impl AsRef<Path>,
+        backend: Backend,
+    ) -> Result<Option<Self>> {
+        let folder = folder.as_ref();
+        let state = run_status(folder)?.state;
+        if state == RunState::Waiting {
+            return Self::prepare(recipe, folder, backend).map(Some);
+        }
+        let (stored, _) = RunFolder::open(folder)?.stored_recipe()?;
+        if let Some(change) = stored.changes(&recipe).first() {
+            return Err(Error::usage(format!(
+                "{}: is a run of another recipe ({change}); delete it, or choose another folder",
+                folder.display()
+            )));
+        }
+        match state {
+            RunState::Done => Ok(None),
+            _ => Self::resume(folder, &[], backend).map(Some),
         }
     }
 }

@@ -1,3 +1,5 @@
+//! Shapes laid onto each other: what is taken out, and what is left.
+
 use std::path::Path;
 
 use super::*;
