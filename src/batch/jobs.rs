@@ -19,7 +19,7 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use isomorph_training::recipe::{Recipe, RecipeError, listed};
+use isomorph_training::recipe::{Correspondences, Recipe, RecipeError, listed};
 use serde::Deserialize;
 
 use crate::error::{Error, Result};
@@ -168,7 +168,8 @@ impl Batch {
                         name: pair_name(source, target, stem),
                         is_named: false,
                         shapes: Shapes::Pair([source.clone(), target.clone()]),
-                        correspondences: group.correspondences.clone(),
+                        correspondences: (group.correspondences.clone())
+                            .map(|known| placed(known, place)),
                         set: Vec::new(),
                     });
                 }
@@ -313,7 +314,7 @@ impl JobEntry {
             name,
             is_named,
             shapes,
-            correspondences: self.correspondences,
+            correspondences: self.correspondences.map(|known| placed(known, place)),
             set: self.set,
         })
     }
@@ -357,6 +358,14 @@ fn tell_apart(jobs: &mut [Job]) -> std::result::Result<(), String> {
             counts[&job.name], job.name
         )),
         None => Ok(()),
+    }
+}
+
+/// A word for correspondences as it is, and a file of them beside the file of jobs.
+fn placed(known: String, place: &Path) -> String {
+    match Correspondences::WORDS.contains(&&known[..]) {
+        true => known,
+        false => place.join(known).display().to_string(),
     }
 }
 

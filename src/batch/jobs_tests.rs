@@ -103,3 +103,15 @@ fn files_of_one_name_in_two_folders_are_told_apart() {
     let batch = read(text, &[]).expect("jobs");
     assert_eq!(names(&batch), ["x_1-x_2", "y_1-y_2"]);
 }
+
+#[test]
+fn a_file_of_pairs_is_beside_the_file_of_jobs() {
+    let text = "[[job]]\nsource = \"a.ply\"\ntarget = \"b.ply\"\ncorrespondences = \"pairs.csv\"\n";
+    let batch = read(text, &[]).expect("jobs");
+    let recipe = batch.recipe(&batch.jobs[0]).expect("a recipe");
+    let beside = batch.path.with_file_name("pairs.csv");
+    assert_eq!(
+        recipe.data.between[0],
+        isomorph_training::recipe::Correspondences::File(beside)
+    );
+}

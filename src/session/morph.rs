@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::event::Event;
 use crate::formats::Shape;
 use crate::geometry::EdgeSharing;
-use crate::recipe::{Align, Recipe};
+use crate::recipe::{Align, Correspondences, Recipe};
 use crate::shape::CleanOptions;
 
 /// What is asked for beyond the files.
@@ -150,7 +150,7 @@ fn planned(files: &[PathBuf], options: &MorphOptions, pairs: &str) -> Result<Rec
                     files.len()
                 )));
             }
-            let is_word = ["same-vertices", "match", "none"].contains(&pairs);
+            let is_word = Correspondences::WORDS.contains(&pairs);
             if files.len() > 2 && !is_word {
                 return Err(Error::usage(format!(
                     "pairs of {pairs}: a file holds those of two shapes; for more, give each key frame a file of its \

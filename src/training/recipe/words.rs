@@ -213,7 +213,8 @@ pub enum Correspondences {
 }
 
 impl Correspondences {
-    pub(crate) const WORDS: &'static [&'static str] = &["none", "same-vertices", "match"];
+    /// The words that stand for no file.
+    pub const WORDS: &'static [&'static str] = &["none", "same-vertices", "match"];
 }
 
 impl Setting for Correspondences {
