@@ -9,6 +9,7 @@ use super::jobs::{Batch, Job};
 use crate::atomic::write_atomically;
 use crate::backend::Backend;
 use crate::error::{Error, Result};
+use crate::event::Event;
 use crate::session::Session;
 use crate::session::state::{RunState, run_status};
 use crate::session::stop::StopFlag;
@@ -57,6 +58,8 @@ pub enum Told<'a> {
     Failed(&'a Job, String),
     /// Another process works on it; it is looked at again at the end.
     Elsewhere(&'a Job, String),
+    /// Nothing new: said many times a second while jobs are worked on, for whoever has other things to look at.
+    Nothing,
 }
 
 /// How many jobs are in which state after the work.
@@ -74,10 +77,16 @@ pub struct Ended {
 ///
 /// # Errors
 /// Those of [`Session`]; a run of another recipe in its folder.
-pub fn run_one(batch: &Batch, job: &Job, backend: Backend, stop: StopFlag) -> Result<()> {
+pub fn run_one(
+    batch: &Batch,
+    job: &Job,
+    backend: Backend,
+    stop: StopFlag,
+    on_event: impl FnMut(&Event),
+) -> Result<()> {
     let session = Session::begin_or_go_on(batch.recipe(job)?, batch.run(job), backend)?;
     if let Some(session) = session {
-        session.stopped_by(stop).train(|_| {})?;
+        session.stopped_by(stop).train(on_event)?;
     }
     Ok(())
 }
@@ -172,7 +181,11 @@ pub fn run(
                 return Ok(ended);
             }
             // Whoever has them may be killed: then they are this one's.
-            std::thread::sleep(WAITED);
+            let begun = Instant::now();
+            while begun.elapsed() < WAITED && !stop.is_set() {
+                std::thread::sleep(LOOKED);
+                tell(Told::Nothing, ended);
+            }
             waiting.append(&mut elsewhere);
             waiting.retain(|job| {
                 let state = run_status(batch.run(job)).map(|status| status.state);
@@ -185,6 +198,7 @@ pub fn run(
             continue;
         }
         std::thread::sleep(LOOKED);
+        tell(Told::Nothing, ended);
     }
 }
 

@@ -4,14 +4,15 @@ use std::path::PathBuf;
 use std::process::Command;
 
 use clap::{Args, Subcommand};
+use isomorph::Backend;
 use isomorph::batch::{
-    Batch, RunBatch, Share, Slurm, Told, collect, estimate, run as work_through, run_one,
-    slurm_script, statuses,
+    Batch, RunBatch, Share, Slurm, Told, at_a_time, collect, cores, estimate, run as work_through,
+    run_one, slurm_script, statuses,
 };
 use isomorph::event::duration;
 use isomorph::status::RunState;
 
-use super::{BackendArgs, DEFAULT_BACKEND, Failure, QuietArgs, Result, print, stop_on_interrupt};
+use super::{BackendArgs, Failure, QuietArgs, Result, print, stop_on_interrupt};
 
 /// Many runs from one file of jobs: on this machine, or as a Slurm job array
 ///
@@ -175,6 +176,7 @@ pub(super) fn run(args: BatchArgs) -> Result {
                 job,
                 args.place.backend()?,
                 stop_on_interrupt(),
+                |_| {},
             )?)
         }
     }
@@ -200,7 +202,7 @@ fn plan(args: &PlanArgs) -> Result {
     // What is wrong with a key is wrong with the first recipe already.
     let first = batch.recipe(&batch.jobs[0])?;
     let found = estimate(&batch);
-    let at_a_time = at_a_time(found.memory_bytes, DEFAULT_BACKEND);
+    let at_a_time = at_a_time(found.memory_bytes, &Backend::default());
     let by = if found.is_measured {
         "by those that are done"
     } else {
@@ -225,34 +227,6 @@ fn plan(args: &PlanArgs) -> Result {
     print(&text)
 }
 
-/// Cores of this machine, or of the task that this is of a Slurm job: not all sites bind tasks to their cores.
-fn cores() -> usize {
-    let of_task = std::env::var("SLURM_CPUS_PER_TASK").ok();
-    let of_task = of_task.and_then(|text| text.parse().ok());
-    of_task.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
-}
-
-/// Jobs at a time where nothing else is asked for: a step gains little from more than two cores.
-fn at_a_time(memory_bytes: Option<u64>, backend: &str) -> usize {
-    if backend == "wgpu" {
-        return 1;
-    }
-    let by_cores = (cores() / 2).max(1);
-    let memory = memory_bytes.zip(available_memory());
-    let by_memory = memory.map_or(by_cores, |(each, all)| (all / each.max(1)) as usize);
-    by_cores.min(by_memory).max(1)
-}
-
-/// Memory that is free for new processes, where the system says.
-fn available_memory() -> Option<u64> {
-    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
-    let line = text
-        .lines()
-        .find_map(|line| line.strip_prefix("MemAvailable:"))?;
-    let kilobytes: u64 = line.trim().strip_suffix(" kB")?.parse().ok()?;
-    Some(1024 * kilobytes)
-}
-
 /// This program with the arguments of one job, but for its name.
 fn command_of_job(batch: &Batch, place: &BackendArgs, words: &[&str]) -> Result<Vec<String>> {
     let text = |path: PathBuf| path.to_string_lossy().into_owned();
@@ -271,13 +245,13 @@ fn command_of_job(batch: &Batch, place: &BackendArgs, words: &[&str]) -> Result<
 fn work(args: &RunArgs) -> Result {
     let batch = Batch::read(&args.jobs)?;
     // A device that is not there is said once, not by each job.
-    args.place.backend()?;
+    let backend = args.place.backend()?;
     batch.recipe(&batch.jobs[0])?;
     let options = RunBatch {
         command: command_of_job(&batch, &args.place, &["job"])?,
         at_a_time: match args.at_a_time {
             Some(wanted) => wanted as usize,
-            None => at_a_time(estimate(&batch).memory_bytes, &args.place.backend),
+            None => at_a_time(estimate(&batch).memory_bytes, &backend),
         },
         cores: cores(),
         share: args.share.unwrap_or(Share::ALL),

@@ -14,6 +14,7 @@ mod batch;
 mod bench;
 mod clean;
 mod compare;
+mod completions;
 mod evaluate;
 mod export;
 mod extract;
@@ -83,6 +84,8 @@ enum Command {
     Info(info::InfoArgs),
     Bench(bench::BenchArgs),
     SelfTest(self_test::SelfTestArgs),
+    Completions(completions::CompletionsArgs),
+    Man(completions::ManArgs),
 }
 
 /// Where networks run.
@@ -252,6 +255,8 @@ pub(crate) fn run(cli: Cli) -> ExitCode {
         Command::Info(args) => info::run(args),
         Command::Bench(args) => bench::run(args),
         Command::SelfTest(args) => self_test::run(args),
+        Command::Completions(args) => completions::completions(&args),
+        Command::Man(args) => completions::man(&args),
     };
     match ended {
         Ok(()) => ExitCode::SUCCESS,

@@ -13,6 +13,7 @@
 //! | `metrics.rs` | two such surfaces compared |
 //! | `pieces.rs` | connected pieces of a mesh |
 //! | `evaluation.rs`, `mean.rs` | the results as they are printed, and their means |
+//! | `table.rs` | the same as a table for people |
 //! | `error.rs` | what can go wrong |
 //!
 //! ```text
@@ -33,6 +34,7 @@ mod natural;
 mod pieces;
 mod reference;
 mod sampled;
+mod table;
 #[cfg(test)]
 mod testing;
 #[cfg(test)]

@@ -79,6 +79,43 @@ impl GroundTruth {
         Self::new(folder.to_owned(), frames, triangles)
     }
 
+    /// Frames that are in memory: the vertices of each, and the triangles of all.
+    ///
+    /// # Errors
+    /// One line: no triangles, one with a vertex that is not there, fewer than three frames, two that differ in their
+    /// number of vertices, a coordinate that is no number.
+    pub fn of(frames: Vec<Vec<[f64; 3]>>, triangles: Vec<[u32; 3]>) -> Result<Self, TruthError> {
+        let named = |frame: usize| PathBuf::from(format!("frame {frame}"));
+        let wrong = |frame: usize, problem: String| TruthError::Inconsistent {
+            path: named(frame),
+            problem,
+            first: named(0),
+        };
+        if triangles.is_empty() {
+            return Err(TruthError::Cloud { path: named(0) });
+        }
+        let needed = frames.first().map_or(0, Vec::len);
+        for (k, frame) in frames.iter().enumerate() {
+            if frame.len() != needed {
+                let found = frame.len();
+                return Err(wrong(
+                    k,
+                    format!("{found} vertices instead of the {needed}"),
+                ));
+            }
+            if let Some(at) = frame.iter().position(|x| !x.iter().all(|c| c.is_finite())) {
+                let problem = format!("vertex {at} is {:?} instead of the numbers", frame[at]);
+                return Err(wrong(k, problem));
+            }
+        }
+        let greatest = triangles.iter().flatten().max();
+        if let Some(corner) = greatest.filter(|corner| **corner as usize >= needed) {
+            let problem = format!("a triangle has vertex {corner} instead of one of the {needed}");
+            return Err(wrong(0, problem));
+        }
+        Self::new(PathBuf::from("frames"), frames, triangles)
+    }
+
     /// Frames that are known to be of one mesh.
     pub(super) fn new(
         path: PathBuf,

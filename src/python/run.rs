@@ -2,15 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
-use isomorph::{
-    Backend, ExtractOptions, OutputFormat, Precision, StopFlag, Trained, current_report,
-};
+use isomorph::{ExtractOptions, OutputFormat, Precision, StopFlag, Trained, current_report};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::exceptions::PyOSError;
 use pyo3::prelude::*;
 
 use crate::arrays::{array, rows};
 use crate::failure::raised;
+use crate::fork::released;
+use crate::train::chosen;
 use crate::watch::Watch;
 
 /// What was trained, opened.
@@ -19,14 +19,24 @@ pub(crate) struct Run(Trained);
 
 /// Opens the newest checkpoint of a run.
 #[pyfunction]
-pub(crate) fn open(py: Python<'_>, run: PathBuf) -> PyResult<Run> {
-    let opened = py.detach(|| Trained::open(&run, Backend::Flex));
+pub(crate) fn open(
+    py: Python<'_>,
+    run: PathBuf,
+    backend: &str,
+    device: Option<String>,
+) -> PyResult<Run> {
+    let backend = chosen(backend, device.as_deref())?;
+    let opened = released(py, || Trained::open(&run, backend));
     opened.map(Run::new).map_err(raised)
 }
 
 impl Run {
     pub(crate) fn new(trained: Trained) -> Self {
         Self(trained)
+    }
+
+    pub(crate) fn trained(&self) -> &Trained {
+        &self.0
     }
 }
 
@@ -67,9 +77,7 @@ impl Run {
         Bound<'py, PyArray2<u32>>,
         Bound<'py, PyArray2<f32>>,
     )> {
-        let found = py
-            .detach(|| self.0.surface(t, resolution))
-            .map_err(raised)?;
+        let found = released(py, || self.0.surface(t, resolution)).map_err(raised)?;
         let mesh = found.mesh;
         Ok((
             array(py, mesh.vertices)?,
@@ -87,7 +95,7 @@ impl Run {
         end: f64,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let points = rows(&points, "points")?;
-        let moved = py.detach(|| self.0.carry(points, start, end));
+        let moved = released(py, || self.0.carry(points, start, end));
         array(py, moved.map_err(raised)?)
     }
 
@@ -99,7 +107,7 @@ impl Run {
         t: f64,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let points = rows(&points, "points")?;
-        let found = py.detach(|| self.0.velocity(points, t));
+        let found = released(py, || self.0.velocity(points, t));
         array(py, found.map_err(raised)?)
     }
 
@@ -112,7 +120,7 @@ impl Run {
         t: f64,
     ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>)> {
         let points = rows(&points, "points")?;
-        let found = py.detach(|| self.0.distance(points, t)).map_err(raised)?;
+        let found = released(py, || self.0.distance(points, t)).map_err(raised)?;
         Ok((
             PyArray1::from_vec(py, found.distances),
             array(py, found.gradients)?,
@@ -141,7 +149,9 @@ impl Run {
         options.folder = Some(folder);
         let stop = StopFlag::default();
         let mut watch = Watch::new(on_event, stop.clone());
-        let ended = py.detach(|| self.0.extract(&options, &stop, |event| watch.hear(event)));
+        let ended = released(py, || {
+            self.0.extract(&options, &stop, |event| watch.hear(event))
+        });
         watch.end(ended).map(drop)
     }
 
@@ -151,7 +161,7 @@ impl Run {
             Some(page) => Ok(page),
             None => self.0.report(None),
         };
-        py.detach(made).map_err(raised)
+        released(py, made).map_err(raised)
     }
 
     fn __fspath__(&self) -> PathBuf {

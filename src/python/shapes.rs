@@ -9,6 +9,7 @@ use pyo3::prelude::*;
 
 use crate::arrays::{array, rows};
 use crate::failure::raised;
+use crate::fork::released;
 use crate::watch::Watch;
 
 /// Vertices, faces (none of a cloud), normals (if there are some), and notes.
@@ -25,7 +26,7 @@ type Pairs<'py> = (Bound<'py, PyArray2<u32>>, Bound<'py, PyArray1<f64>>);
 /// Reads a file.
 #[pyfunction]
 pub(crate) fn read_shape(py: Python<'_>, path: PathBuf) -> PyResult<Parts<'_>> {
-    let shape = py.detach(|| Shape::read(&path)).map_err(raised)?;
+    let shape = released(py, || Shape::read(&path)).map_err(raised)?;
     let is_mesh = shape.is_mesh();
     let Shape { mesh, notes, .. } = shape;
     Ok((
@@ -46,7 +47,7 @@ pub(crate) fn write_shape(
     normals: Option<PyReadonlyArray2<'_, f32>>,
 ) -> PyResult<()> {
     let shape = of(&vertices, faces.as_ref(), normals.as_ref())?;
-    py.detach(|| shape.write(&path)).map_err(raised)
+    released(py, || shape.write(&path)).map_err(raised)
 }
 
 /// The normals of a cloud, out of the shape, `[n, 3]`.
@@ -56,7 +57,7 @@ pub(crate) fn estimate_normals<'py>(
     points: PyReadonlyArray2<'py, f64>,
 ) -> PyResult<Bound<'py, PyArray2<f32>>> {
     let shape = of(&points, None, None)?;
-    let found = py.detach(|| normals::estimate(&shape));
+    let found = released(py, || normals::estimate(&shape));
     array(py, found.cloud.normals.unwrap_or_default())
 }
 
@@ -85,8 +86,9 @@ pub(crate) fn match_shapes<'py>(
         ..MatchOptions::default()
     };
     let mut watch = Watch::new(on_event, StopFlag::default());
-    let found =
-        py.detach(|| correspondence::find(&source, &target, &options, |event| watch.hear(event)));
+    let found = released(py, || {
+        correspondence::find(&source, &target, &options, |event| watch.hear(event))
+    });
     let found = watch.end(found)?;
     let pairs = found.pairs.iter().map(|pair| [pair.source, pair.target]);
     let sure = found.pairs.iter().map(|pair| pair.confidence).collect();

@@ -7,6 +7,7 @@ use isomorph::{Backend, Recipe, Session};
 use pyo3::prelude::*;
 
 use crate::failure::raised;
+use crate::fork::released;
 use crate::run::Run;
 use crate::watch::Watch;
 
@@ -22,24 +23,29 @@ type Plan = (String, Vec<String>, Vec<(String, String)>);
 
 /// A recipe for files as TOML, what it takes for granted, and what may be wrong with it.
 #[pyfunction]
+#[expect(
+    clippy::too_many_arguments,
+    reason = "a Python function with as many named arguments"
+)]
 pub(crate) fn plan(
     py: Python<'_>,
     files: Vec<PathBuf>,
     times: Option<Vec<f64>>,
     preset: String,
     pairs: Option<String>,
+    align: String,
     frames: usize,
     changes: Vec<String>,
 ) -> PyResult<Plan> {
     let options = MorphOptions {
-        align: "auto".to_owned(),
+        align,
         pairs,
         preset,
         times,
         frames,
         changes,
     };
-    let plan = py.detach(|| plan_morph(&files, &options));
+    let plan = released(py, || plan_morph(&files, &options));
     let plan = plan.map_err(raised)?;
     let doubts = plan
         .doubts
@@ -50,7 +56,11 @@ pub(crate) fn plan(
 
 /// Trains a recipe into a folder.
 #[pyfunction]
-#[pyo3(signature = (text, origin, changes, run, replace, on_event))]
+#[pyo3(signature = (text, origin, changes, run, replace, backend, device, on_event))]
+#[expect(
+    clippy::too_many_arguments,
+    reason = "a Python function with as many named arguments"
+)]
 pub(crate) fn train(
     py: Python<'_>,
     text: &str,
@@ -58,10 +68,13 @@ pub(crate) fn train(
     changes: Vec<String>,
     run: PathBuf,
     replace: bool,
+    backend: &str,
+    device: Option<String>,
     on_event: Option<Py<PyAny>>,
 ) -> PyResult<Run> {
     let recipe = parsed(text, &origin, &changes)?;
-    let session = py.detach(|| Session::prepare(recipe, &run, Backend::Flex));
+    let backend = chosen(backend, device.as_deref())?;
+    let session = released(py, || Session::prepare(recipe, &run, backend));
     let session = session.map_err(raised)?;
     let session = if replace {
         session.replacing()
@@ -73,15 +86,27 @@ pub(crate) fn train(
 
 /// Goes on with a run.
 #[pyfunction]
-#[pyo3(signature = (run, changes, on_event))]
+#[pyo3(signature = (run, changes, backend, device, on_event))]
 pub(crate) fn resume(
     py: Python<'_>,
     run: PathBuf,
     changes: Vec<String>,
+    backend: &str,
+    device: Option<String>,
     on_event: Option<Py<PyAny>>,
 ) -> PyResult<Run> {
-    let session = py.detach(|| Session::resume(&run, &changes, Backend::Flex));
+    let backend = chosen(backend, device.as_deref())?;
+    let session = released(py, || Session::resume(&run, &changes, backend));
     trained(py, session.map_err(raised)?, on_event)
+}
+
+/// The backend of a name, on a device.
+pub(crate) fn chosen(backend: &str, device: Option<&str>) -> PyResult<Backend> {
+    let backend: Backend = backend.parse().map_err(raised)?;
+    match device {
+        Some(device) => backend.on(device).map_err(raised),
+        None => Ok(backend),
+    }
 }
 
 fn parsed(text: &str, origin: &Path, changes: &[String]) -> PyResult<Recipe> {
@@ -90,6 +115,6 @@ fn parsed(text: &str, origin: &Path, changes: &[String]) -> PyResult<Recipe> {
 
 fn trained(py: Python<'_>, mut session: Session, on_event: Option<Py<PyAny>>) -> PyResult<Run> {
     let mut watch = Watch::new(on_event, session.stop_flag());
-    let ended = py.detach(|| session.train(|event| watch.hear(event)));
+    let ended = released(py, || session.train(|event| watch.hear(event)));
     watch.end(ended).map(Run::new)
 }

@@ -5,8 +5,8 @@
 //! values stay in its cache.
 
 use std::panic::resume_unwind;
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::thread::ScopedJoinHandle;
 
 use isomorph_model::without_denormals;
@@ -22,9 +22,22 @@ pub(crate) struct Workers {
 
 impl Workers {
     /// As many workers as rayon's own pool has threads (`RAYON_NUM_THREADS`, else the cores).
+    ///
+    /// A process that was forked from one with workers has none of their threads, and makes its own.
     pub(crate) fn shared() -> &'static Self {
-        static SHARED: OnceLock<Workers> = OnceLock::new();
-        SHARED.get_or_init(|| Self::new(rayon::current_num_threads()))
+        static SHARED: Mutex<Option<(u32, &Workers)>> = Mutex::new(None);
+        let own = std::process::id();
+        let mut shared = SHARED.lock().unwrap_or_else(PoisonError::into_inner);
+        match *shared {
+            Some((process, workers)) if process == own => workers,
+            // Those of the parent stay in memory: their threads, which would end them, are not here.
+            _ => {
+                let workers: &Workers =
+                    Box::leak(Box::new(Self::new(rayon::current_num_threads())));
+                *shared = Some((own, workers));
+                workers
+            }
+        }
     }
 
     /// `count` workers, or fewer if the system gives no more threads.

@@ -11,12 +11,16 @@ Shapes are anything that `Shape.of` takes. Coordinates are the user's own, in an
 in a file is a `ValueError`, work that failed is a `TrainingError`; Ctrl-C leaves a checkpoint, and `resume` goes on.
 """
 
+from ._batch import Batch
+from ._evaluation import Evaluation, evaluate
 from ._native import TrainingError
 from ._run import Run, Surface, open
 from ._shape import Shape, ShapeLike
 from ._work import IsomorphWarning, estimate_normals, match, morph, resume, train
 
 __all__ = [
+    "Batch",
+    "Evaluation",
     "IsomorphWarning",
     "Run",
     "Shape",
@@ -24,6 +28,7 @@ __all__ = [
     "Surface",
     "TrainingError",
     "estimate_normals",
+    "evaluate",
     "match",
     "morph",
     "open",

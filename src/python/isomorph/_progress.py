@@ -43,6 +43,30 @@ def listener(
             bar.close()
 
 
+@contextmanager
+def batch_listener(
+    on_event: Callable[[dict], object] | None, progress: bool | None, jobs: int
+) -> Iterator[Callable[[str], None] | None]:
+    """The same for a batch of so many jobs: a bar that moves with each that is done."""
+    if progress is None:
+        progress = on_event is None and watched() and find_spec("tqdm") is not None
+    if not progress:
+        with listener(on_event, False) as heard:
+            yield heard
+        return
+    from tqdm.auto import tqdm
+
+    with tqdm(total=jobs, unit="run", leave=False) as bar:
+
+        def moved(event: dict) -> None:
+            bar.update(event["done"] + event["failed"] - bar.n)
+            if event["failed"]:
+                bar.set_postfix(failed=event["failed"])
+
+        with listener(on_event, False, also=moved) as heard:
+            yield heard
+
+
 def follow(bar, event: dict) -> None:
     """Moves the bar."""
     kind = event["event"]

@@ -78,23 +78,66 @@ class Run:
         return [json.loads(line) for line in self._native.metrics()]
 
     def surface(self, t: float | None = None, resolution: int = 192) -> Surface:
-        """The surface at a time, half-way without one. resolution: cells of the grid along the longest side of the box, 8 to 2048."""
+        """The surface at a time.
+
+        Args:
+            t: the time; half-way without it.
+            resolution: cells of the grid along the longest side of the box, 8 to 2048.
+
+        Returns:
+            `vertices (n, 3)` float64 and `faces (m, 3)` uint32, to be unpacked; `.normals (n, 3)` float32 beside them.
+
+        Raises:
+            ValueError: a time or a resolution out of range.
+        """
         return Surface(*self._native.surface(self._half_way(t), resolution))
 
     def carry(self, points: Any, start: float | None = None, end: float | None = None) -> np.ndarray:
-        """Where points `(n, 3)` that are given at time `start` are at time `end`, `(n, 3)`: from the first shape to the
-        last without them.
+        """Moves points along the motion.
+
+        Args:
+            points: `(n, 3)`, where they are at time `start`. float64 in C order is read without a copy.
+            start: the time at which they are given; that of the first shape without it.
+            end: the time to which they are moved; that of the last shape without it.
+
+        Returns:
+            Where they are at time `end`, `(n, 3)` float64.
+
+        Raises:
+            ValueError: a time out of range, another shape of array.
         """
         first, *_, last = self.times
         start, end = (first if start is None else float(start)), (last if end is None else float(end))
         return self._native.carry(rows("points", points, np.float64), start, end)
 
     def velocity(self, points: Any, t: float | None = None) -> np.ndarray:
-        """The velocity `(n, 3)` of what is at `points` at time `t`, in units of length per unit of time."""
+        """The velocity of what is at some points.
+
+        Args:
+            points: `(n, 3)`.
+            t: the time; half-way without it.
+
+        Returns:
+            `(n, 3)` float64, in units of length per unit of time.
+
+        Raises:
+            ValueError: a time out of range, another shape of array.
+        """
         return self._native.velocity(rows("points", points, np.float64), self._half_way(t))
 
     def distance(self, points: Any, t: float | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """The signed distance `(n,)` of points from the surface at a time, negative inside, and its gradient `(n, 3)`."""
+        """The signed distance of points from the surface at a time.
+
+        Args:
+            points: `(n, 3)`.
+            t: the time; half-way without it.
+
+        Returns:
+            The distances `(n,)`, negative inside, and their gradients `(n, 3)`, float64.
+
+        Raises:
+            ValueError: a time out of range, another shape of array.
+        """
         return self._native.distance(rows("points", points, np.float64), self._half_way(t))
 
     def save_glb(
@@ -107,8 +150,23 @@ class Run:
         on_event: Callable[[dict], object] | None = None,
         progress: bool | None = None,
     ) -> Path:
-        """Writes an animated glTF. what: "carried", the source's own mesh moving, or "surface", a surface at each of
-        `frames` times; "carried" where the source is a mesh. compact: half of the size, not for every reader.
+        """Writes an animated glTF, for Blender and browsers.
+
+        Args:
+            path: the file; it must end in `.glb`.
+            what: "carried", the source's own mesh moving, or "surface", a surface at each time; "carried" where the
+                source is a mesh, without it.
+            frames: how many times, evenly from the first shape to the last.
+            resolution: see `surface`; as in the recipe without it.
+            compact: positions in 16 bits: half of the size, and fewer programs read it.
+            on_event: see `morph`.
+            progress: see `morph`.
+
+        Returns:
+            The path.
+
+        Raises:
+            ValueError: another ending; "carried" of a cloud.
         """
         if what not in (None, "carried", "surface"):
             raise ValueError(f'what = {what!r}: must be "carried" or "surface"')
@@ -132,7 +190,14 @@ class Run:
         return Path(self._native.page())
 
     def show(self, height: int = 600) -> Any:
-        """Shows the page: in a notebook within it, else in the browser."""
+        """Shows the page: in a notebook within it, else in the browser.
+
+        Args:
+            height: of the frame in a notebook, in pixels.
+
+        Returns:
+            What a notebook shows; None elsewhere.
+        """
         page = self.page()
         if in_notebook():
             from html import escape
@@ -154,9 +219,21 @@ class Run:
         return f"<isomorph run {self.path}>"
 
 
-def open(run: str | os.PathLike[str]) -> Run:
-    """Opens the newest checkpoint of a run, whoever made it."""
-    return Run(_native.open(os.fspath(run)))
+def open(run: str | os.PathLike[str], *, backend: str = "flex", device: str | None = None) -> Run:
+    """Opens the newest checkpoint of a run, whoever made it.
+
+    Args:
+        run: its folder.
+        backend: see `morph`.
+        device: see `morph`.
+
+    Returns:
+        The run.
+
+    Raises:
+        ValueError: no run, or one without a checkpoint; a backend or a device that is not there.
+    """
+    return Run(_native.open(os.fspath(run), backend, device))
 
 
 def in_notebook() -> bool:

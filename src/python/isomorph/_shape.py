@@ -17,8 +17,14 @@ ShapeLike = Union["Shape", str, "os.PathLike[str]", np.ndarray, tuple, Any]
 class Shape:
     """A mesh, or a point cloud, which has no faces.
 
-    vertices: numbers `(n, 3)`. faces: whole numbers `(m, 3)`, counter-clockwise from outside. normals: `(n, 3)`.
-    A `ValueError` says what is wrong with an array.
+    Args:
+        vertices: numbers `(n, 3)`; float64 in C order is kept without a copy.
+        faces: whole numbers `(m, 3)` from 0 to n - 1, counter-clockwise from outside.
+        normals: `(n, 3)`.
+        notes: what was decided about the contents of a file, one sentence each.
+
+    Raises:
+        ValueError: what is wrong with an array.
     """
 
     def __init__(self, vertices: Any, faces: Any = None, normals: Any = None, notes: list[str] | None = None):
@@ -32,13 +38,32 @@ class Shape:
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Shape:
-        """Reads PLY, OBJ, STL, OFF, glTF, NPY, NPZ or text, by the ending of the name."""
+        """Reads a file: PLY, OBJ, STL, OFF, glTF, NPY, NPZ or text, by the ending of its name.
+
+        Args:
+            path: the file.
+
+        Returns:
+            The shape; its `notes` have what was decided about the file.
+
+        Raises:
+            ValueError: what is wrong with the file, and where.
+        """
         return cls(*_native.read_shape(os.fspath(path)))
 
     @classmethod
     def of(cls, what: ShapeLike) -> Shape:
-        """The shape of a path, of arrays (points, or a tuple of vertices, faces and normals), or of an object of trimesh,
-        open3d, meshio or pyvista. No other package is imported: an object needs the attributes alone.
+        """The shape that something is.
+
+        Args:
+            what: a shape; a path; points `(n, 3)`; a tuple of vertices, faces and normals; or an object of `trimesh`,
+                `open3d`, `meshio` or `pyvista`. No other package is imported: an object needs the attributes alone.
+
+        Returns:
+            The shape.
+
+        Raises:
+            ValueError: what is none of these.
         """
         if isinstance(what, cls):
             return what
@@ -58,7 +83,15 @@ class Shape:
         )
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes PLY or OBJ, by the ending of the name."""
+        """Writes a file, PLY or OBJ, by the ending of its name.
+
+        Args:
+            path: the file.
+
+        Raises:
+            ValueError: another ending.
+            isomorph.TrainingError: the file cannot be written.
+        """
         _native.write_shape(os.fspath(path), self.vertices, self.faces, self.normals)
 
     def __repr__(self) -> str:

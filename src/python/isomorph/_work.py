@@ -27,33 +27,59 @@ def morph(
     preset: str = "instant",
     times: Sequence[float] | None = None,
     pairs: Any = None,
+    align: str = "auto",
     run: str | os.PathLike[str] | None = None,
     overwrite: bool = False,
     frames: int = 13,
     settings: Mapping[str, Any] | None = None,
+    backend: str = "flex",
+    device: str | None = None,
     on_event: Callable[[dict], object] | None = None,
     progress: bool | None = None,
 ) -> Run:
-    """Computes the motion from one shape to another, or through more of them, smoothly.
+    """Computes the motion from one shape to another, or smoothly through more of them.
 
-    times: of the shapes, in any unit, ascending; 0, 1, 2 and so on without it. More than two shapes take the preset
-    "instant". preset: "instant" (seconds), "quick", "default" (minutes) or "quality". pairs: corresponding points as an array
-    `(n, 2)` of vertex numbers or the path of a file; "same-vertices", "match" (found) or "none"; chosen by the shapes
-    without it. run: the folder [runs/SOURCE-TARGET]. frames: surfaces that are written into it. settings: keys of the
-    recipe, as in `{"training": {"steps": 2000}}` or `{"training.steps": 2000}`.
+    Args:
+        source: the shape at time 0; see `Shape.of` for what is a shape.
+        target: the shape at time 1.
+        more: further shapes, at the times 2, 3 and so on. Then the preset is "instant".
+        preset: "instant" (seconds), "quick", "default" (minutes) or "quality".
+        times: those of the shapes, in any unit, ascending; 0, 1, 2 and so on without it.
+        pairs: corresponding points as an array `(n, 2)` of vertex numbers, or the path of a file; "same-vertices",
+            "match" (found) or "none"; chosen by the shapes without it.
+        align: how shapes are laid onto each other first: "none", "rigid", "similarity", or "auto", which does what is
+            clearly needed. Results lie where the shapes do.
+        run: the folder of the run [runs/SOURCE-TARGET].
+        overwrite: whether a run that is there is replaced.
+        frames: the number of surfaces that are written into the folder.
+        settings: keys of the recipe, as in `{"training": {"steps": 2000}}` or `{"training.steps": 2000}`.
+        backend: what does the arithmetic of networks: "flex" or "ndarray" on processors, "wgpu" on GPUs.
+        device: of "wgpu": "default", "cpu", "discrete[:N]", "integrated[:N]" or "virtual[:N]".
+        on_event: called with each event of the work, a dict with the name `event`.
+        progress: whether a bar of `tqdm` is shown; without it where nobody listens, `tqdm` is installed, and there is a
+            terminal or a notebook.
+
+    Returns:
+        The run. Its `notes` have what was assumed and decided.
+
+    Raises:
+        ValueError: a shape, a key or a value that is wrong; a run that is there already.
+        isomorph.TrainingError: work that failed.
+        KeyboardInterrupt: on Ctrl-C; a checkpoint is left, and `resume` goes on.
     """
     run = Path(run) if run else Path("runs") / f"{name_of(source, 'source')}-{name_of(more[-1] if more else target, 'target')}"
     kept = Kept(run)
     files = [kept.shape(source, "source"), kept.shape(target, "target")]
     files += [kept.shape(shape, f"shape-{number}") for number, shape in enumerate(more, 2)]
     times = None if times is None else [float(time) for time in times]
-    text, assumed, doubts = _native.plan(files, times, preset, kept.pairs(pairs), frames, changes(settings))
+    planned = _native.plan(files, times, preset, kept.pairs(pairs), align, frames, changes(settings))
+    text, assumed, doubts = planned
     notes = list(assumed)
     for finding, cure in doubts:
         notes.append(f"doubtful: {finding}; {cure}")
         warnings.warn(f"{finding}; {cure}", IsomorphWarning, stacklevel=2)
-    return work(lambda heard: _native.train(text, str(run / "recipe.toml"), [], str(run), overwrite, heard),
-                notes, on_event, progress)
+    given = (text, str(run / "recipe.toml"), [], str(run), overwrite, backend, device)
+    return work(lambda heard: _native.train(*given, heard), notes, on_event, progress)
 
 
 def train(
@@ -62,11 +88,31 @@ def train(
     *,
     overwrite: bool = False,
     settings: Mapping[str, Any] | None = None,
+    backend: str = "flex",
+    device: str | None = None,
     on_event: Callable[[dict], object] | None = None,
     progress: bool | None = None,
 ) -> Run:
-    """Trains a recipe into a folder. recipe: the path of a TOML file, TOML itself (with a line end in it), or nested
-    dicts; paths in it are relative to the file, else to the working directory. settings: see `morph`.
+    """Trains a recipe into a folder.
+
+    Args:
+        recipe: the path of a TOML file, TOML itself (with a line end in it), or nested dicts. Paths in it are relative to
+            the file, else to the working directory.
+        run: the folder of the run.
+        overwrite: whether a run that is there is replaced.
+        settings: see `morph`.
+        backend: see `morph`.
+        device: see `morph`.
+        on_event: see `morph`.
+        progress: see `morph`.
+
+    Returns:
+        The run.
+
+    Raises:
+        ValueError: a recipe or a file that is wrong; a run that is there already.
+        isomorph.TrainingError: work that failed.
+        KeyboardInterrupt: on Ctrl-C; a checkpoint is left, and `resume` goes on.
     """
     if isinstance(recipe, Mapping):
         text, origin = toml(recipe), Path.cwd() / "recipe.toml"
@@ -78,7 +124,7 @@ def train(
             text = origin.read_text("utf-8")
         except (OSError, UnicodeDecodeError) as reason:
             raise ValueError(f"{origin}: cannot be read ({reason})") from None
-    given = (text, str(origin), changes(settings), os.fspath(run), overwrite)
+    given = (text, str(origin), changes(settings), os.fspath(run), overwrite, backend, device)
     return work(lambda heard: _native.train(*given, heard), [], on_event, progress)
 
 
@@ -86,11 +132,30 @@ def resume(
     run: str | os.PathLike[str],
     *,
     settings: Mapping[str, Any] | None = None,
+    backend: str = "flex",
+    device: str | None = None,
     on_event: Callable[[dict], object] | None = None,
     progress: bool | None = None,
 ) -> Run:
-    """Goes on with a run from its newest checkpoint, to the last step of its recipe. settings: see `morph`."""
-    given = (os.fspath(run), changes(settings))
+    """Goes on with a run from its newest checkpoint, to the last step of its recipe.
+
+    Args:
+        run: the folder of the run, or a run.
+        settings: keys that change, such as `{"training.steps": 2000}`; see `morph`.
+        backend: see `morph`.
+        device: see `morph`.
+        on_event: see `morph`.
+        progress: see `morph`.
+
+    Returns:
+        The run.
+
+    Raises:
+        ValueError: no run, a key or a value that is wrong.
+        isomorph.TrainingError: a key that a trained network cannot change; work that failed.
+        KeyboardInterrupt: on Ctrl-C; a checkpoint is left.
+    """
+    given = (os.fspath(run), changes(settings), backend, device)
     return work(lambda heard: _native.resume(*given, heard), [], on_event, progress)
 
 
@@ -102,8 +167,20 @@ def match(
     confidence: float = 0.5,
     on_event: Callable[[dict], object] | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Finds pairs of corresponding vertices, `(n, 2)`, and how sure each is, `(n,)` from 0 to 1. aligned: the shapes are
-    in one frame. confidence: the least that a pair must have.
+    """Finds pairs of corresponding vertices of two shapes.
+
+    Args:
+        source: a shape; see `Shape.of`.
+        target: the same thing in another pose or state.
+        aligned: whether the shapes are in one frame, so that no turn is looked for.
+        confidence: the least that a pair must have, 0 to 1.
+        on_event: see `morph`.
+
+    Returns:
+        The pairs, `(n, 2)` numbers of vertices of the source and of the target, and how sure each is, `(n,)` from 0 to 1.
+
+    Raises:
+        ValueError: a shape that is wrong, or shapes that cannot be matched.
     """
     shapes = [Shape.of(source), Shape.of(target)]
     given = [(shape.vertices, shape.faces) for shape in shapes]
@@ -112,7 +189,17 @@ def match(
 
 
 def estimate_normals(points: Any) -> np.ndarray:
-    """The normals `(n, 3)` of a cloud of points `(n, 3)`, out of the shape."""
+    """Estimates the normals of a cloud.
+
+    Args:
+        points: `(n, 3)`.
+
+    Returns:
+        Unit vectors `(n, 3)`, out of the shape, float32.
+
+    Raises:
+        ValueError: another shape of array; too few points.
+    """
     return _native.estimate_normals(rows("points", points, np.float64))
 
 

@@ -321,3 +321,171 @@ def test_three_shapes_are_one_motion_in_their_own_time(place):
         isomorph.morph(at(0), at(2), at(5), times=[0, 2], run="other")
     with pytest.raises(ValueError, match="networks are trained on two"):
         isomorph.morph(at(0), at(2), at(5), preset="quick", run="other")
+
+
+def test_a_run_is_measured_against_true_frames(run, place):
+    vertices, faces = sphere()
+    frames = np.stack([vertices + [0.5 * t, 0, 0] for t in (0.0, 0.25, 0.5, 1.0)])
+    found = isomorph.evaluate(run, frames[[0, 2, 3]], faces=faces, samples=2000, resolution=32)
+    assert [frame["frame"] for frame in found.frames] == [1]
+    assert found.mean["carried"]["tracked_rmse"] < 0.02 and found.mean["surface"]["components"] == 1
+    assert "surface" in str(found) and "floor" in repr(found)
+    assert json.loads((run.path / "evaluation.json").read_text())["mean"] == found.mean
+    # Meshes, files, and numbers of frames say the same.
+    (place / "frames").mkdir()
+    for number, frame in enumerate(frames):
+        isomorph.Shape(frame, faces).save(place / f"frames/frame-{number}.ply")
+    again = isomorph.evaluate(run, place / "frames", keys=[0, 3], every=2, samples=2000, resolution=32)
+    assert [frame["frame"] for frame in again.frames] == [2]
+    meshes = [(frame, faces) for frame in frames]
+    assert len(isomorph.evaluate(run, meshes, samples=2000, resolution=32).frames) == 2
+    heard = []
+    isomorph.evaluate(run, meshes, samples=1000, resolution=32, on_event=heard.append)
+    assert heard and all("event" in event for event in heard)
+    for given, kept, why in (
+        (frames[:2], {"faces": faces}, "at least 3 needed"),
+        (frames, {}, "give faces="),
+        (frames + [3, 0, 0], {"faces": faces}, "is not"),
+        (frames, {"faces": faces + 1}, "must be 0 to"),
+        ([*frames[:3], frames[3][1:]], {"faces": faces[faces.max(axis=1) < 50]}, "vertices instead of"),
+        (frames, {"faces": faces, "samples": 1}, "samples = 1"),
+        (frames, {"faces": faces, "every": 0}, "every = 0"),
+        (frames, {"faces": faces, "keys": [2, 9]}, "frames 0 to 3"),
+        (place / "nowhere", {}, "nowhere"),
+    ):
+        with pytest.raises(ValueError, match=why):
+            isomorph.evaluate(run, given, **kept)
+
+
+def test_many_runs_go_on_after_a_failure_and_are_not_done_twice(place):
+    isomorph.Shape(*sphere()).save("a.ply")
+    (place / "broken.ply").write_text("ply\n")
+    jobs = [
+        (sphere(), sphere(0.5)),
+        {"name": "files", "source": "a.ply", "target": sphere(0.3), "pairs": "same-vertices"},
+        {"name": "broken", "source": "a.ply", "target": "broken.ply"},
+    ]
+    settings = {"data.points": 1000, "spline.band": 500, "result.resolution": 16, "result.frames": 2}
+    batch = isomorph.Batch(jobs, folder="runs/many", settings=settings)
+    assert len(batch) == 3 and list(batch)[1:] == ["files", "broken"]
+    assert [job["state"] for job in batch.status()] == ["waiting"] * 3
+    events = []
+    with pytest.warns(isomorph.IsomorphWarning, match="broken failed: .*broken.ply"):
+        found = batch.run(2, on_event=events.append)
+    assert sorted(job["state"] for job in found) == ["done", "done", "failed"]
+    assert events[-1]["done"] == 2 and events[-1]["failed"] == 1 and events[-1]["left"] == 0
+    moved = batch["files"].carry(sphere()[0])
+    assert np.abs(moved - sphere(0.3)[0]).mean() < 0.02
+    with pytest.raises(KeyError):
+        batch["none"]
+    rows = batch.collect()
+    assert [row["name"] for row in rows] == batch.names
+    assert (batch.folder / "index.html").exists()
+    # The fault is mended: only what failed runs again, of a batch that was opened anew.
+    isomorph.Shape(*sphere(0.2)).save("broken.ply")
+    events.clear()
+    again = pickle.loads(pickle.dumps(batch))
+    assert {job["state"] for job in again.run(on_event=events.append)} == {"done"}
+    assert [event["job"] for event in events if event["event"] == "job_started"] == ["broken"]
+    for wrong, why in (([], "has no jobs"), ([{"source": "a.ply"}], "must be source and target")):
+        with pytest.raises(ValueError, match=why):
+            isomorph.Batch(wrong, folder="runs/wrong")
+    with pytest.raises(ValueError, match="jobs_at_a_time = 0"):
+        batch.run(0)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+def test_ctrl_c_in_a_batch_leaves_checkpoints_of_what_was_at_work(place):
+    isomorph.Shape(*sphere()).save("a.ply")
+    isomorph.Shape(*sphere(0.5)).save("b.ply")
+    settings = SMALL | {"training": SMALL["training"] | {"steps": 100000}, "checkpoint.every": 100000}
+    code = (
+        "import isomorph, json\n"
+        f"settings = json.loads({json.dumps(settings)!r})\n"
+        "isomorph.Batch([('a.ply', 'b.ply')], folder='many', preset='quick', settings=settings).run(1)\n"
+    )
+    child = subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.PIPE, text=True)
+    metrics = place / "many/a-b/metrics.jsonl"
+    while not (metrics.exists() and metrics.stat().st_size):
+        assert child.poll() is None, child.stderr.read()
+        time.sleep(0.01)
+    child.send_signal(signal.SIGINT)
+    _, told = child.communicate(timeout=60)
+    assert "KeyboardInterrupt" in told
+    [job] = isomorph.Batch("many.toml").status()
+    assert job["state"] == "interrupted" and 0 < job["step"] < 100000
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="systems that fork")
+@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
+def test_a_forked_process_works_too(run):
+    points = sphere()[0]
+    wanted, surface = run.carry(points), run.surface(0.5, 32)
+    trained = isomorph.morph(sphere(), sphere(0.5), run="networks", frames=0, preset="quick", settings=SMALL)
+
+    def same():
+        assert np.array_equal(run.carry(points), wanted)
+        assert np.array_equal(run.surface(0.5, 32).vertices, surface.vertices)
+        # Training too, which has threads of its own.
+        again = isomorph.morph(sphere(), sphere(0.5), run=f"in-{os.getpid()}", frames=0, preset="quick", settings=SMALL)
+        assert np.array_equal(again.carry(points), trained.carry(points))
+        found = []
+        thread = threading.Thread(target=lambda: found.append(run.carry(points)))
+        thread.start()
+        thread.join()
+        assert np.array_equal(found[0], wanted)
+
+    def forked(work):
+        child = os.fork()
+        if child:
+            for _ in range(600):
+                ended, status = os.waitpid(child, os.WNOHANG)
+                if ended:
+                    return os.waitstatus_to_exitcode(status)
+                time.sleep(0.1)
+            os.kill(child, signal.SIGKILL)
+            os.waitpid(child, 0)
+            return "a forked process did not answer"
+        try:
+            work()
+        except BaseException as error:
+            print(repr(error), file=sys.stderr)
+            os._exit(1)
+        os._exit(0)
+
+    def twice():
+        same()
+        assert forked(same) == 0
+
+    assert forked(twice) == 0
+
+
+def test_backends_are_chosen_by_name(run):
+    points = sphere()[0]
+    other = isomorph.open(run.path, backend="ndarray")
+    assert np.allclose(other.carry(points), run.carry(points), atol=1e-5)
+    for given, why in (({"backend": "cuda"}, "cuda"), ({"device": "discrete"}, "devices are chosen with the backend wgpu")):
+        with pytest.raises(ValueError, match=why):
+            isomorph.open(run.path, **given)
+        with pytest.raises(ValueError, match=why):
+            isomorph.morph(sphere(), sphere(1), run="other", **given)
+
+
+def test_a_million_points_are_not_copied_on_the_way_in(run):
+    import tracemalloc
+
+    points = np.random.default_rng(0).uniform(-0.5, 0.5, (1_000_000, 3))
+    assert isomorph.Shape(points).vertices is points
+    tracemalloc.start()
+    moved = run.carry(points, 0.0, 0.0)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    # numpy tells tracemalloc of its arrays: one of the result, which Rust gives, is not its own.
+    assert peak < points.nbytes / 4
+    assert np.array_equal(moved, points) and moved.flags.c_contiguous
+    # Other types and orders are converted once.
+    tracemalloc.start()
+    run.carry(np.asfortranarray(points[:100_000]), 0.0, 0.0)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak > 100_000 * 24
