@@ -92,6 +92,11 @@ pub mod python {
     #![doc = include_str!("python.md")]
 }
 
+pub mod python_api {
+    #![doc = include_str!("links.txt")]
+    #![doc = include_str!("python_api.md")]
+}
+
 pub mod robustness {
     #![doc = include_str!("links.txt")]
     #![doc = include_str!("robustness.md")]

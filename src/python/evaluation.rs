@@ -70,7 +70,7 @@ pub(crate) fn evaluate(
     };
     let stop = StopFlag::default();
     let mut watch = Watch::new(on_event, stop.clone());
-    let (trained, truth) = (run.trained(), &frames.0);
+    let (trained, truth) = (run.ready()?, &frames.0);
     if let [from, to] = keys[..] {
         let ended = released(py, || {
             trained.evaluate(truth, [from, to], &options, &stop, |event| {

@@ -6,6 +6,8 @@
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Mutex, PoisonError};
 
+use isomorph::Backend;
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
@@ -20,6 +22,24 @@ pub(crate) fn imported() {
     IMPORTED.store(std::process::id(), Ordering::Relaxed);
 }
 
+/// Whether this process was forked from the one in which the package was imported.
+fn is_forked() -> bool {
+    std::process::id() != IMPORTED.load(Ordering::Relaxed)
+}
+
+/// A forked process has none of the threads that talk to a GPU either, and there nothing else can be begun.
+///
+/// # Errors
+/// `ValueError` for the backend wgpu in a forked process.
+pub(crate) fn allowed(backend: &Backend) -> PyResult<()> {
+    match backend {
+        Backend::Wgpu { .. } if is_forked() => Err(PyValueError::new_err(
+            "backend wgpu: a forked process cannot use a GPU; begin it with the method \"spawn\" of multiprocessing",
+        )),
+        _ => Ok(()),
+    }
+}
+
 /// Does work while other threads of Python run.
 pub(crate) fn released<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> T {
     py.detach(|| match own_pool() {
@@ -30,10 +50,10 @@ pub(crate) fn released<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send)
 
 /// In a forked process the pool of this process; none elsewhere, and none where the system gives no threads.
 fn own_pool() -> Option<&'static ThreadPool> {
-    let process = std::process::id();
-    if process == IMPORTED.load(Ordering::Relaxed) {
+    if !is_forked() {
         return None;
     }
+    let process = std::process::id();
     let mut own = OWN.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some((of, pool)) = &*own
         && *of == process

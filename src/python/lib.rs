@@ -23,6 +23,10 @@ mod shapes;
 mod train;
 mod watch;
 
+/// Memory of this module alone: arrays that numpy makes are numpy's, and each is given back to whom it is from.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 /// The module `isomorph._native`.
 #[pyo3::pymodule]
 mod _native {

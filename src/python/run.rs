@@ -2,20 +2,25 @@
 
 use std::path::{Path, PathBuf};
 
-use isomorph::{ExtractOptions, OutputFormat, Precision, StopFlag, Trained, current_report};
+use isomorph::{
+    Backend, ExtractOptions, OutputFormat, Precision, StopFlag, Trained, current_report,
+};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::exceptions::PyOSError;
 use pyo3::prelude::*;
 
 use crate::arrays::{array, rows};
 use crate::failure::raised;
-use crate::fork::released;
+use crate::fork::{allowed, released};
 use crate::train::chosen;
 use crate::watch::Watch;
 
 /// What was trained, opened.
 #[pyclass(frozen, module = "isomorph._native")]
-pub(crate) struct Run(Trained);
+pub(crate) struct Run {
+    trained: Trained,
+    backend: Backend,
+}
 
 /// Opens the newest checkpoint of a run.
 #[pyfunction]
@@ -26,17 +31,23 @@ pub(crate) fn open(
     device: Option<String>,
 ) -> PyResult<Run> {
     let backend = chosen(backend, device.as_deref())?;
-    let opened = released(py, || Trained::open(&run, backend));
-    opened.map(Run::new).map_err(raised)
+    let opened = released(py, || Trained::open(&run, backend.clone()));
+    let trained = opened.map_err(raised)?;
+    Ok(Run::new(trained, backend))
 }
 
 impl Run {
-    pub(crate) fn new(trained: Trained) -> Self {
-        Self(trained)
+    pub(crate) fn new(trained: Trained, backend: Backend) -> Self {
+        Self { trained, backend }
     }
 
-    pub(crate) fn trained(&self) -> &Trained {
-        &self.0
+    /// What was trained, for something to compute.
+    ///
+    /// # Errors
+    /// It was opened on a GPU, by the process from which this one was forked.
+    pub(crate) fn ready(&self) -> PyResult<&Trained> {
+        allowed(&self.backend)?;
+        Ok(&self.trained)
     }
 }
 
@@ -44,22 +55,22 @@ impl Run {
 impl Run {
     /// The folder.
     fn path(&self) -> PathBuf {
-        self.0.path()
+        self.trained.path()
     }
 
     /// The times of the key frames.
     fn key_times(&self) -> Vec<f64> {
-        self.0.key_times()
+        self.trained.key_times()
     }
 
     /// The recipe as TOML.
     fn recipe(&self) -> String {
-        self.0.recipe().to_toml()
+        self.trained.recipe().to_toml()
     }
 
     /// The logged steps, each as a JSON object in text.
     fn metrics(&self) -> PyResult<Vec<String>> {
-        let metrics = self.0.metrics().map_err(raised)?;
+        let metrics = self.trained.metrics().map_err(raised)?;
         let text = |each| serde_json::to_string(each);
         let lines = metrics.iter().map(text).collect::<Result<_, _>>();
         lines.map_err(|error| PyOSError::new_err(error.to_string()))
@@ -77,7 +88,8 @@ impl Run {
         Bound<'py, PyArray2<u32>>,
         Bound<'py, PyArray2<f32>>,
     )> {
-        let found = released(py, || self.0.surface(t, resolution)).map_err(raised)?;
+        let trained = self.ready()?;
+        let found = released(py, || trained.surface(t, resolution)).map_err(raised)?;
         let mesh = found.mesh;
         Ok((
             array(py, mesh.vertices)?,
@@ -94,8 +106,8 @@ impl Run {
         start: f64,
         end: f64,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let points = rows(&points, "points")?;
-        let moved = released(py, || self.0.carry(points, start, end));
+        let (points, trained) = (rows(&points, "points")?, self.ready()?);
+        let moved = released(py, || trained.carry(points, start, end));
         array(py, moved.map_err(raised)?)
     }
 
@@ -106,8 +118,8 @@ impl Run {
         points: PyReadonlyArray2<'py, f64>,
         t: f64,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let points = rows(&points, "points")?;
-        let found = released(py, || self.0.velocity(points, t));
+        let (points, trained) = (rows(&points, "points")?, self.ready()?);
+        let found = released(py, || trained.velocity(points, t));
         array(py, found.map_err(raised)?)
     }
 
@@ -119,8 +131,8 @@ impl Run {
         points: PyReadonlyArray2<'py, f64>,
         t: f64,
     ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>)> {
-        let points = rows(&points, "points")?;
-        let found = released(py, || self.0.distance(points, t)).map_err(raised)?;
+        let (points, trained) = (rows(&points, "points")?, self.ready()?);
+        let found = released(py, || trained.distance(points, t)).map_err(raised)?;
         Ok((
             PyArray1::from_vec(py, found.distances),
             array(py, found.gradients)?,
@@ -138,38 +150,41 @@ impl Run {
         compact: bool,
         on_event: Option<Py<PyAny>>,
     ) -> PyResult<()> {
-        let mut options = ExtractOptions::of(self.0.recipe());
+        let trained = self.ready()?;
+        let mut options = ExtractOptions::of(trained.recipe());
         options.format = OutputFormat::Animation(match compact {
             true => Precision::Compact,
             false => Precision::Full,
         });
-        options.times = self.0.even_times(frames);
+        options.times = trained.even_times(frames);
         options.resolution = resolution.unwrap_or(options.resolution);
         options.carry = true;
         options.folder = Some(folder);
         let stop = StopFlag::default();
         let mut watch = Watch::new(on_event, stop.clone());
         let ended = released(py, || {
-            self.0.extract(&options, &stop, |event| watch.hear(event))
+            self.trained
+                .extract(&options, &stop, |event| watch.hear(event))
         });
         watch.end(ended).map(drop)
     }
 
     /// The page of the run, made anew where it is older than the run.
     fn page(&self, py: Python<'_>) -> PyResult<PathBuf> {
-        let made = || match current_report(self.0.path())? {
+        let trained = self.ready()?;
+        let made = || match current_report(trained.path())? {
             Some(page) => Ok(page),
-            None => self.0.report(None),
+            None => trained.report(None),
         };
         released(py, made).map_err(raised)
     }
 
     fn __fspath__(&self) -> PathBuf {
-        self.0.path()
+        self.trained.path()
     }
 
     fn __repr__(&self) -> String {
-        format!("<isomorph run {}>", shown(&self.0.path()))
+        format!("<isomorph run {}>", shown(&self.trained.path()))
     }
 }
 

@@ -7,7 +7,7 @@ use isomorph::{Backend, Recipe, Session};
 use pyo3::prelude::*;
 
 use crate::failure::raised;
-use crate::fork::released;
+use crate::fork::{allowed, released};
 use crate::run::Run;
 use crate::watch::Watch;
 
@@ -74,14 +74,14 @@ pub(crate) fn train(
 ) -> PyResult<Run> {
     let recipe = parsed(text, &origin, &changes)?;
     let backend = chosen(backend, device.as_deref())?;
-    let session = released(py, || Session::prepare(recipe, &run, backend));
+    let session = released(py, || Session::prepare(recipe, &run, backend.clone()));
     let session = session.map_err(raised)?;
     let session = if replace {
         session.replacing()
     } else {
         session
     };
-    trained(py, session, on_event)
+    trained(py, session, backend, on_event)
 }
 
 /// Goes on with a run.
@@ -96,25 +96,33 @@ pub(crate) fn resume(
     on_event: Option<Py<PyAny>>,
 ) -> PyResult<Run> {
     let backend = chosen(backend, device.as_deref())?;
-    let session = released(py, || Session::resume(&run, &changes, backend));
-    trained(py, session.map_err(raised)?, on_event)
+    let session = released(py, || Session::resume(&run, &changes, backend.clone()));
+    trained(py, session.map_err(raised)?, backend, on_event)
 }
 
 /// The backend of a name, on a device.
 pub(crate) fn chosen(backend: &str, device: Option<&str>) -> PyResult<Backend> {
     let backend: Backend = backend.parse().map_err(raised)?;
-    match device {
-        Some(device) => backend.on(device).map_err(raised),
-        None => Ok(backend),
-    }
+    let backend = match device {
+        Some(device) => backend.on(device).map_err(raised)?,
+        None => backend,
+    };
+    allowed(&backend)?;
+    Ok(backend)
 }
 
 fn parsed(text: &str, origin: &Path, changes: &[String]) -> PyResult<Recipe> {
     Recipe::parse(text, origin, changes).map_err(|error| raised(error.into()))
 }
 
-fn trained(py: Python<'_>, mut session: Session, on_event: Option<Py<PyAny>>) -> PyResult<Run> {
+fn trained(
+    py: Python<'_>,
+    mut session: Session,
+    backend: Backend,
+    on_event: Option<Py<PyAny>>,
+) -> PyResult<Run> {
     let mut watch = Watch::new(on_event, session.stop_flag());
     let ended = released(py, || session.train(|event| watch.hear(event)));
-    watch.end(ended).map(Run::new)
+    let trained = watch.end(ended)?;
+    Ok(Run::new(trained, backend))
 }

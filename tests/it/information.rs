@@ -150,6 +150,8 @@ fn every_command_has_help_that_names_its_defaults() {
         ),
         ("info", &["recipe", "run"]),
         ("bench", &["--json"]),
+        ("completions", &["bash", "zsh", "fish"]),
+        ("man", &["--output"]),
     ];
     let overview = place.isomorph(&["--help"]).succeeded().stdout;
     for (command, parts) in cases {
@@ -166,6 +168,34 @@ fn every_command_has_help_that_names_its_defaults() {
         }
     }
     assert!(overview.contains("First steps"), "{overview}");
+}
+
+#[test]
+fn shells_and_man_are_given_all_commands() {
+    let place = Workplace::new();
+    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+        let text = place.isomorph(&["completions", shell]).succeeded().stdout;
+        for word in ["morph", "extract", "--smallest-component", "self-test"] {
+            let word = if shell == "fish" {
+                word.trim_start_matches("--")
+            } else {
+                word
+            };
+            assert!(text.contains(word), "{shell}: no {word}");
+        }
+    }
+    let page = place.isomorph(&["man"]).succeeded().stdout;
+    assert!(
+        page.contains(".TH isomorph 1") && page.contains("isomorph\\-train"),
+        "{page}"
+    );
+    place.isomorph(&["man", "--output", "man1"]).succeeded();
+    for page in ["isomorph.1", "isomorph-train.1", "isomorph-batch-run.1"] {
+        let text = std::fs::read_to_string(place.path("man1").join(page)).expect(page);
+        assert!(text.contains(".SH SYNOPSIS"), "{page}: {text}");
+    }
+    let train = std::fs::read_to_string(place.path("man1/isomorph-train.1")).expect("it was read");
+    assert!(train.contains("resume\\-if\\-exists"), "{train}");
 }
 
 #[test]

@@ -21,9 +21,9 @@ class Batch:
     What is done is not done again: a batch may be stopped, extended, and run again, here or by `isomorph batch`.
 
     Args:
-        jobs: the path of a file of jobs, as `isomorph batch` reads it; or pairs `(source, target)` of shapes, or dicts
-            with `source`, `target` and, as wanted, `name`, `pairs` and `settings`.
-        folder: where the runs go, for jobs that are not a file [runs/batch].
+        jobs: the path of a file of jobs, as `isomorph batch` reads it, or a list. In a list are pairs
+            `(source, target)` of shapes, or dicts with `source` and `target`. `name`, `pairs` and `settings` are optional.
+        folder: where the runs go, for jobs that are not a file.
         preset: of all runs, for jobs that are not a file.
         settings: keys of all recipes, for jobs that are not a file; see `morph`.
 

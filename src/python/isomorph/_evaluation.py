@@ -17,18 +17,20 @@ from ._shape import Shape, indices, is_path, rows
 class Evaluation:
     """How close a run comes to true frames. Printed, it is a table.
 
-    Lengths are in normalised units, in which the mean surface area of the two ends is 1.
+    Lengths are in normalised units, in which the mean surface area of the two ends is 1. `data` has all numbers, as
+    `isomorph evaluate --json` prints them.
     """
 
     def __init__(self, data: dict, table: str):
-        #: All numbers, as `isomorph evaluate --json` prints them.
         self.data = data
         self._table = table
 
     @property
     def mean(self) -> dict:
-        """The means over all frames: `surface` and `carried` of the run, `linear` (straight lines between all true
-        vertices), `floor` (two samplings of the truth), each with `chamfer`, `hausdorff`, `tracked_rmse` and more.
+        """The means over all frames: `surface` and `carried` of the run, `linear` and `floor`.
+
+        Each has `chamfer`, `hausdorff`, `tracked_rmse` and more. `linear` is straight lines between all true vertices.
+        `floor` is two samplings of the truth.
         """
         return self.data["mean"]
 

@@ -25,7 +25,9 @@ def listener(
         from tqdm.auto import tqdm
 
         bar = tqdm(unit="step", leave=False)
-    listeners = [each for each in (also, on_event, bar and partial(follow, bar)) if each is not None]
+    # A bar without a length has no truth of its own.
+    moved = None if bar is None else partial(follow, bar)
+    listeners = [each for each in (also, on_event, moved) if each is not None]
     if not listeners:
         # Without a listener nothing is encoded; Ctrl-C is seen all the same.
         yield None
@@ -86,4 +88,11 @@ def follow(bar, event: dict) -> None:
 
 def watched() -> bool:
     """Whether somebody looks: a terminal, or a notebook."""
-    return sys.stderr.isatty() or "ipykernel" in sys.modules
+    return sys.stderr.isatty() or in_notebook()
+
+
+def in_notebook() -> bool:
+    try:
+        return get_ipython().has_trait("kernel")  # type: ignore[name-defined]
+    except (NameError, AttributeError):
+        return False

@@ -13,12 +13,12 @@ from typing import Any, Callable
 import numpy as np
 
 from . import _native
-from ._progress import listener
+from ._progress import in_notebook, listener
 from ._shape import rows
 
 
 class Surface(tuple):
-    """Vertices `(n, 3)` and faces `(m, 3)`, to be unpacked; unit normals `(n, 3)` beside them."""
+    """A surface: vertices `(n, 3)` and faces `(m, 3)`, to be unpacked; unit normals `(n, 3)` in `normals`."""
 
     normals: np.ndarray
 
@@ -29,10 +29,12 @@ class Surface(tuple):
 
     @property
     def vertices(self) -> np.ndarray:
+        """`(n, 3)`, float64, in the coordinates of the shapes."""
         return self[0]
 
     @property
     def faces(self) -> np.ndarray:
+        """`(m, 3)`, uint32, counter-clockwise from outside."""
         return self[1]
 
     def __getnewargs__(self):
@@ -44,7 +46,7 @@ class Surface(tuple):
 
 class Run:
     """The motion between two shapes, or through more. Times are 0 (the source) to 1 (the target), or in the unit of the
-    recipe's key frames. Coordinates are those of the shapes.
+    recipe's key frames. Coordinates are those of the shapes. `notes` has what was assumed, decided and doubted on the way.
 
     Several threads may use one run. A copy, and what is unpickled, opens the folder again.
     """
@@ -234,10 +236,3 @@ def open(run: str | os.PathLike[str], *, backend: str = "flex", device: str | No
         ValueError: no run, or one without a checkpoint; a backend or a device that is not there.
     """
     return Run(_native.open(os.fspath(run), backend, device))
-
-
-def in_notebook() -> bool:
-    try:
-        return get_ipython().has_trait("kernel")  # type: ignore[name-defined]
-    except (NameError, AttributeError):
-        return False

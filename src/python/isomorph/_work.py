@@ -45,11 +45,11 @@ def morph(
         more: further shapes, at the times 2, 3 and so on. Then the preset is "instant".
         preset: "instant" (seconds), "quick", "default" (minutes) or "quality".
         times: those of the shapes, in any unit, ascending; 0, 1, 2 and so on without it.
-        pairs: corresponding points as an array `(n, 2)` of vertex numbers, or the path of a file; "same-vertices",
-            "match" (found) or "none"; chosen by the shapes without it.
+        pairs: corresponding points as an array `(n, 2)` of vertex numbers, or the path of a file. Or "same-vertices",
+            "match" (found) or "none". Chosen by the shapes without it.
         align: how shapes are laid onto each other first: "none", "rigid", "similarity", or "auto", which does what is
             clearly needed. Results lie where the shapes do.
-        run: the folder of the run [runs/SOURCE-TARGET].
+        run: the folder of the run; runs/SOURCE-TARGET without it.
         overwrite: whether a run that is there is replaced.
         frames: the number of surfaces that are written into the folder.
         settings: keys of the recipe, as in `{"training": {"steps": 2000}}` or `{"training.steps": 2000}`.

@@ -201,6 +201,20 @@ def test_training_is_heard_and_equals_that_of_the_command_line(place):
         assert np.array_equal(isomorph.open("other").carry(points), run.carry(points))
 
 
+def test_a_bar_of_tqdm_follows_training_surfaces_and_batches(place, capsys):
+    pytest.importorskip("tqdm")
+    run = isomorph.morph(sphere(), sphere(0.5), preset="quick", run="run", frames=2, settings=SMALL, progress=True)
+    assert "40/40" in capsys.readouterr().err
+    run.save_glb("motion.glb", frames=3, resolution=16, progress=True)
+    assert "surfaces" in capsys.readouterr().err
+    settings = {"data.points": 1000, "spline.band": 500, "result.frames": 0}
+    isomorph.Batch([(sphere(), sphere(0.5))], folder="many", settings=settings).run(progress=True)
+    assert "1/1" in capsys.readouterr().err
+    # Nobody looks: no bar.
+    run.save_glb("motion.glb", frames=2, resolution=16)
+    assert capsys.readouterr().err == ""
+
+
 def test_a_run_is_resumed_with_more_steps(place):
     for name, shift in (("a", 0.0), ("b", 0.5)):
         isomorph.Shape(*sphere(shift)).save(f"{name}.ply")
@@ -434,6 +448,8 @@ def test_a_forked_process_works_too(run):
         thread.start()
         thread.join()
         assert np.array_equal(found[0], wanted)
+        with pytest.raises(ValueError, match="a forked process cannot use a GPU"):
+            isomorph.open(run.path, backend="wgpu")
 
     def forked(work):
         child = os.fork()
