@@ -141,11 +141,14 @@ class Run:
         return (1 - weight) * g + weight * h
 
     def _signed(self, shape: int, x: np.ndarray) -> np.ndarray:
-        """The signed distance of a closed mesh."""
+        """The signed distance of a closed mesh, or of an open sheet of some thickness."""
         points, triangles = (self.arrays[f"shape.{shape}.{of}"] for of in ("points", "triangles"))
         at_once = max(1, 2_000_000 // len(triangles))
         chunks = [x[k : k + at_once] for k in range(0, len(x), at_once)]
-        return np.concatenate([signed_distance(chunk, points[triangles]) for chunk in chunks])
+        found = np.concatenate([signed_distance(chunk, points[triangles]) for chunk in chunks])
+        # Exports of before know no sheets.
+        thickness = self.splines.get("thickness", [None] * (shape + 1))[shape]
+        return found if thickness is None else np.abs(found) - thickness / 2
 
     @staticmethod
     def _encoded(x: np.ndarray, frequencies: int) -> np.ndarray:

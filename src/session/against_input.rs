@@ -52,6 +52,8 @@ pub(super) struct End {
     mesh: Option<Mesh<f32>>,
     /// Whether each point lies at the border of what is known; empty where nothing is missing.
     border: Vec<bool>,
+    /// How far the surface is from a sheet inside of it.
+    inside: f64,
 }
 
 impl End {
@@ -64,6 +66,10 @@ impl End {
             points: key.cloud.points.clone(),
             mesh: key.mesh.clone(),
             border: key.border.clone(),
+            inside: key
+                .sheet
+                .as_ref()
+                .map_or(0.0, |sheet| f64::from(sheet.thickness) / 2.0),
         };
         let is_kept =
             |(k, _): &(usize, &Keyframe)| count <= MOST_SHAPES || *k == 0 || *k + 1 == count;
@@ -92,7 +98,7 @@ impl End {
         let mut found = Vec::new();
         let reached =
             mean(some(&self.points).map(|x| f64::from(search.closest(*x, 0).squared).sqrt()));
-        if reached > REACHED {
+        if reached > REACHED + self.inside {
             found.push((
                 format!("misses the {name} by {reached:.3} in the mean, of a size of about 1"),
                 LONGER,
@@ -277,6 +283,7 @@ mod tests {
             points: mesh.vertices.clone(),
             mesh: closed.then_some(mesh),
             border: Vec::new(),
+            inside: 0.0,
         }
     }
 

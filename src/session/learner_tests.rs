@@ -48,6 +48,7 @@ fn spheres() -> Keyframes {
         },
         mesh: None,
         border: Vec::new(),
+        sheet: None,
     });
     Keyframes {
         keys: keys.collect(),

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use isomorph_training::method::spline::is_solved;
+use isomorph_training::method::spline::{self, is_solved};
 
 use super::align::{Aligned, aligned};
 use crate::error::Result;
@@ -183,6 +183,7 @@ fn options(recipe: &Recipe, between: Vec<CorrespondenceSource>) -> DataOptions {
             recipe::NormalSource::None => NormalSource::None,
         },
         mirrored: section.mirrored,
+        sheets: is_solved(recipe).then(|| spline::keys(recipe).sheet_thickness),
         seed: recipe.training.seed,
     }
 }

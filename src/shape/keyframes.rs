@@ -53,6 +53,9 @@ pub(crate) struct DataOptions {
     pub normals: NormalSource,
     /// Whether pairs may mirror a shape.
     pub mirrored: bool,
+    /// The thickness of open sheets, normalised, where shapes themselves are carried. None of it, or 0, where they are
+    /// closed by a cushion.
+    pub sheets: Option<f64>,
     /// Names the samples that are drawn.
     pub seed: u64,
 }
@@ -77,6 +80,15 @@ pub struct Keyframe {
     pub(crate) mesh: Option<Mesh<f32>>,
     /// Whether each point lies at the border of what is known of the shape; empty where nothing is missing.
     pub(crate) border: Vec<bool>,
+    /// The shape itself if it is an open sheet that has a thickness.
+    pub(crate) sheet: Option<Sheet>,
+}
+
+/// A mesh that encloses nothing, normalised, and how thick it is taken to be.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Sheet {
+    pub mesh: Mesh<f32>,
+    pub thickness: f32,
 }
 
 /// What messages call shape `k` of `count`.
@@ -307,7 +319,14 @@ fn key_frame(
 ) -> Result<Keyframe, ShapeError> {
     let mut rng = Draw::Points(k).generator(options.seed);
     notes.extend(shape.notes.iter().cloned());
-    notes.extend(mismatch::sheet(shape));
+    let thickness = options.sheets.filter(|thickness| *thickness > 0.0);
+    let is_sheet = mismatch::is_sheet(shape);
+    if is_sheet {
+        notes.push(mismatch::of_sheet(
+            shape,
+            thickness.map(|own| own / normalisation.scale),
+        ));
+    }
     let (points, normals) = points_of(shape, options.points, options.normals, &mut rng, notes)?;
     let points = points.into_iter().map(|point| normalisation.apply(point));
     let cloud = PointCloud {
@@ -319,11 +338,16 @@ fn key_frame(
         (None, Some(normals)) => border::points_at(&cloud.points, normals),
         _ => Vec::new(),
     };
+    let sheet = thickness.filter(|_| is_sheet).map(|thickness| Sheet {
+        mesh: shape.mesh.moved(|x| normalisation.apply(x)),
+        thickness: thickness as f32,
+    });
     Ok(Keyframe {
         time: options.times[k],
         cloud,
         mesh,
         border,
+        sheet,
     })
 }
 

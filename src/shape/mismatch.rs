@@ -145,10 +145,10 @@ pub(super) fn are_turned_over(pairs: &[PointPair], clouds: [&PointCloud; 2]) -> 
 /// sheet.
 const SHEET: f64 = 0.6;
 
-/// What is said of a mesh that encloses nothing.
-pub(super) fn sheet(shape: &Shape) -> Option<String> {
+/// Whether a shape is a mesh that encloses nothing.
+pub(super) fn is_sheet(shape: &Shape) -> bool {
     if !shape.is_mesh() || EdgeSharing::of(&shape.mesh).is_closed() {
-        return None;
+        return false;
     }
     let vectors = shape
         .mesh
@@ -157,13 +157,22 @@ pub(super) fn sheet(shape: &Shape) -> Option<String> {
         .map(|t| shape.mesh.area_vector(*t));
     let sum = vectors.fold([0.0; 3], add);
     let share = dot(sum, sum).sqrt() / 2.0 / shape.mesh.area();
-    (share > SHEET).then(|| {
-        format!(
-            "{}: an open sheet has no inside: its surfaces are closed behind it by a cushion, which may reach the box; use \
-             the carried mesh (--carry), which is the sheet itself",
-            shape.path.display()
-        )
-    })
+    share > SHEET
+}
+
+/// What is said of such a shape, of this thickness in its own unit or of none.
+pub(super) fn of_sheet(shape: &Shape, thickness: Option<f64>) -> String {
+    let name = shape.path.display();
+    match thickness {
+        Some(thickness) => format!(
+            "{name}: an open sheet has no inside: its surfaces are {thickness:.3} thick (spline.sheet-thickness); the \
+             carried mesh (--carry) is the sheet itself"
+        ),
+        None => format!(
+            "{name}: an open sheet has no inside: its surfaces are closed behind it by a cushion, which may reach the box; \
+             use the carried mesh (--carry), which is the sheet itself, or the preset instant, which gives it a thickness"
+        ),
+    }
 }
 
 /// The bounding boxes of shapes that are far apart, in words.
@@ -287,7 +296,10 @@ mod tests {
     #[test]
     fn a_sheet_is_told_from_a_mesh_with_holes() {
         let mut ball = bumpy_sphere(20);
-        let of = |mesh: &Mesh<f64>| sheet(&Shape::at(Path::new("a.ply"), mesh.clone()));
+        let of = |mesh: &Mesh<f64>| {
+            let shape = Shape::at(Path::new("a.ply"), mesh.clone());
+            is_sheet(&shape).then(|| of_sheet(&shape, None))
+        };
         assert_eq!(of(&ball), None);
         let half = ball.triangles.len() / 2;
         ball.triangles.drain(..half / 5);

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::border::{Known, KnownSearch};
 use super::far::FarField;
-use super::keyframes::Keyframe;
+use super::keyframes::{Keyframe, Sheet};
 use super::reconstruct::reconstruct;
 use crate::geometry::linear::{cross, difference, scaled, unit};
 use crate::geometry::{Closest, Mesh, TriangleSearch};
@@ -38,6 +38,9 @@ pub(crate) struct SolidParts {
     /// Where the shape is known, if it is not everywhere.
     #[serde(default)]
     pub known: Option<Known>,
+    /// The thickness of an open sheet, whose mesh it then is: inside is what is nearer than half of that.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub thickness: Option<f32>,
 }
 
 /// Checkpoints of before do not say.
@@ -48,11 +51,21 @@ const fn unknown() -> bool {
 impl SolidParts {
     /// Of a key frame; `None` if it is neither a closed mesh nor has normals, or its points close to nothing.
     pub(crate) fn of(key: &Keyframe) -> Option<Self> {
+        if let Some(Sheet { mesh, thickness }) = &key.sheet {
+            return Some(Self {
+                points: mesh.vertices.clone(),
+                triangles: mesh.triangles.clone(),
+                may_overlap: false,
+                known: None,
+                thickness: Some(*thickness),
+            });
+        }
         let of = |mesh: Mesh<f32>, may_overlap| Self {
             points: mesh.vertices,
             triangles: mesh.triangles,
             may_overlap,
             known: Known::of(&key.cloud.points, &key.border),
+            thickness: None,
         };
         match &key.mesh {
             Some(mesh) => Some(of(mesh.clone(), true)),
@@ -79,7 +92,9 @@ impl SolidParts {
         let finite = |rows: &[[f32; 3]]| rows.as_flattened().iter().all(|part| part.is_finite());
         let named = self.triangles.as_flattened().iter();
         let known = self.known.as_ref().is_none_or(Known::is_whole);
+        let is_thick = |own: f32| own.is_finite() && own > 0.0;
         known
+            && self.thickness.is_none_or(is_thick)
             && count > 0
             && finite(&self.points)
             && named.clone().all(|&index| (index as usize) < count)
@@ -99,6 +114,8 @@ struct Exact {
     search: TriangleSearch,
     /// Whether parts of it lie inside others.
     overlaps: bool,
+    /// Half of the thickness of a sheet.
+    half: Option<f32>,
 }
 
 impl Solid {
@@ -110,7 +127,12 @@ impl Solid {
         let mesh = Mesh::new(parts.points.clone(), parts.triangles.clone());
         let search = TriangleSearch::new(&mesh)?;
         let overlaps = parts.may_overlap && overlaps(&search);
-        let exact = Exact { search, overlaps };
+        let half = parts.thickness.map(|own| own / 2.0);
+        let exact = Exact {
+            search,
+            overlaps,
+            half,
+        };
         let far = FarField::new(&parts.points, |places| exact.distances(places));
         let known = parts.known.as_ref().map(Known::arranged);
         Some(Self {
@@ -166,7 +188,10 @@ impl Solid {
                 unit(search.normal(&closest))
             } else {
                 let away = unit(difference(x, closest.point));
-                scaled(away, self.exact.sign(&closest, x))
+                match self.exact.half {
+                    Some(_) => away,
+                    None => scaled(away, self.exact.sign(&closest, x)),
+                }
             }
         };
         places.par_iter().with_min_len(AT_A_TIME).map(at).collect()
@@ -181,7 +206,11 @@ impl Exact {
             let at = |&x: &[f32; 3]| {
                 let closest = self.search.closest(x, near);
                 near = closest.triangle;
-                self.sign(&closest, x) * closest.squared.sqrt()
+                let away = closest.squared.sqrt();
+                match self.half {
+                    Some(half) => away - half,
+                    None => self.sign(&closest, x) * away,
+                }
             };
             chunk.iter().map(at).collect::<Vec<f32>>()
         });
@@ -227,6 +256,43 @@ mod tests {
             triangles: mesh.triangles.clone(),
             may_overlap: true,
             known: None,
+            thickness: None,
+        }
+    }
+
+    #[test]
+    fn a_sheet_is_as_thick_as_it_is_said_to_be() {
+        // A square of side 1 in the plane z = 0.
+        let square = Mesh::new(
+            vec![[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]],
+            vec![[0, 1, 2], [0, 2, 3]],
+        );
+        let sheet = |thickness| {
+            let thickness = Some(thickness);
+            Solid::new(SolidParts {
+                thickness,
+                may_overlap: false,
+                ..parts(&square)
+            })
+        };
+        let solid = sheet(0.04).expect("a sheet");
+        let places = [
+            [0.5, 0.5, 0.05],
+            [0.5, 0.5, -0.05],
+            [0.5, 0.5, 0.0],
+            [1.1, 0.5, 0.0],
+            [0.3, 0.4, 0.01],
+        ];
+        let distances = solid.distances(&places);
+        for (found, wanted) in distances.iter().zip([0.03, 0.03, -0.02, 0.08, -0.01]) {
+            assert!((found - wanted).abs() < 1e-6, "{distances:?}");
+        }
+        let gradients = solid.gradients(&places);
+        assert_eq!(gradients[0], [0.0, 0.0, 1.0]);
+        assert_eq!(gradients[1], [0.0, 0.0, -1.0]);
+        assert_eq!(gradients[3], [1.0, 0.0, 0.0]);
+        for wrong in [0.0, -1.0, f32::NAN, f32::INFINITY] {
+            assert!(sheet(wrong).is_none(), "{wrong}");
         }
     }
 

@@ -24,7 +24,7 @@ pub(crate) struct SolvedArrays {
 pub(crate) fn arrays(records: &Records) -> Result<SolvedArrays, RecordError> {
     let (field, _, parts) = stored::read(records)?;
     let mut out = SolvedArrays::default();
-    let mut is_partial = Vec::new();
+    let (mut is_partial, mut thickness) = (Vec::new(), Vec::new());
     for (k, shape) in parts.iter().enumerate() {
         let points = shape.points.as_flattened().to_vec();
         let corners = shape.triangles.as_flattened().to_vec();
@@ -37,6 +37,7 @@ pub(crate) fn arrays(records: &Records) -> Result<SolvedArrays, RecordError> {
             corners,
         ));
         is_partial.push(shape.known.is_some());
+        thickness.push(shape.thickness);
     }
     let ends = |s: usize| [&parts[s].points[..], &parts[s + 1].points[..]];
     let mut intervals = Vec::new();
@@ -58,6 +59,8 @@ pub(crate) fn arrays(records: &Records) -> Result<SolvedArrays, RecordError> {
         "intervals": intervals,
         // Where a shape is known in part, the blend of both distances has weights of its own.
         "partial": is_partial,
+        // Of an open sheet: its distance is that of its triangles, without a sign, less half of this.
+        "thickness": thickness,
     });
     Ok(out)
 }

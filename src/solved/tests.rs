@@ -20,6 +20,7 @@ fn keyframes(angle: f32) -> Keyframes {
         },
         mesh: Some(mesh.clone()),
         border: Vec::new(),
+        sheet: None,
     };
     let pairs = first
         .vertices
@@ -372,6 +373,7 @@ fn what_a_scan_does_not_show_moves_with_its_neighbours_and_is_there_at_the_end()
         correspondence_fraction: 0.1,
         normals: NormalSource::Auto,
         mirrored: false,
+        sheets: None,
         seed: 0,
     };
     let keyframes = prepare(&[Shape::of(ball.clone()), target], &options).expect("shapes");
@@ -427,6 +429,7 @@ fn falling() -> Keyframes {
             },
             mesh: Some(mesh.clone()),
             border: Vec::new(),
+            sheet: None,
         })
         .collect();
     out.between = (meshes.windows(2))

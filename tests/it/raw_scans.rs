@@ -5,7 +5,7 @@ use std::fmt::Write;
 use serde_json::Value;
 
 use crate::support::mesh::{Mesh, Point};
-use crate::support::ply;
+use crate::support::ply::{self, Ply};
 use crate::support::workplace::Workplace;
 
 /// A ball of many points.
@@ -177,4 +177,83 @@ fn a_result_that_is_not_its_input_is_called_so_and_strict_fails() {
     place
         .isomorph(&strict)
         .refused(1, &["contradicts the shapes"]);
+}
+
+/// A square sheet of side 2, bent upwards by `bend` along x.
+fn cloth(bend: f64) -> Mesh {
+    const SIDE: u32 = 24;
+    let at = |i: u32| f64::from(i) / f64::from(SIDE) * 2.0 - 1.0;
+    let corners = (0..=SIDE).flat_map(|i| (0..=SIDE).map(move |k| (i, k)));
+    let vertices = corners.map(|(i, k)| [at(i), at(k), bend * at(i) * at(i)]);
+    let cells = (0..SIDE).flat_map(|i| (0..SIDE).map(move |k| i * (SIDE + 1) + k));
+    let two = |a: u32| {
+        let b = a + SIDE + 1;
+        [[a, b, b + 1], [a, b + 1, a + 1]]
+    };
+    Mesh {
+        vertices: vertices.collect(),
+        triangles: cells.flat_map(two).collect(),
+    }
+}
+
+#[test]
+fn a_sheet_has_a_thickness_and_is_cut_off_nowhere() {
+    let place = Workplace::new();
+    place.write("a.ply", ply::text(&cloth(0.0)));
+    place.write("b.ply", ply::text(&cloth(0.4)));
+    let morph = [
+        "morph",
+        "a.ply",
+        "b.ply",
+        "-o",
+        "run",
+        "--pairs",
+        "same-vertices",
+    ];
+    let more = [
+        "--frames",
+        "3",
+        "--set",
+        "result.resolution=128",
+        "--strict",
+    ];
+    let said = place
+        .isomorph(&[&morph[..], &more[..]].concat())
+        .succeeded()
+        .stderr;
+    // The side of a sheet of area 1 is a unit of the recipe: 0.02 of about 2.05.
+    assert!(
+        said.contains("an open sheet has no inside: its surfaces are 0.04"),
+        "{said}"
+    );
+    assert!(
+        !said.contains("doubtful") && !said.contains("the box cuts"),
+        "{said}"
+    );
+    let thickness = 0.02 * 2.05;
+    place
+        .isomorph(&[
+            "extract",
+            "run",
+            "--times",
+            "0,0.5,1",
+            "--resolution",
+            "160",
+            "--carry",
+            "-o",
+            "out",
+        ])
+        .succeeded();
+    for (k, bend) in [0.0, 0.2, 0.4].into_iter().enumerate() {
+        let surface = Ply::read(&place.path(&format!("out/surface-00{k}.ply"))).mesh();
+        assert!(
+            surface.is_closed() && surface.components() == 1,
+            "at frame {k}"
+        );
+        // The area of the bent sheet times its thickness, and half a tube around its rim.
+        let area = 4.0 * (1.0 + 2.0 / 3.0 * bend * bend);
+        let wanted = area * thickness + 8.0 * std::f64::consts::PI / 8.0 * thickness * thickness;
+        let volume = surface.volume() / wanted;
+        assert!((0.85..1.15).contains(&volume), "at frame {k}: {volume}");
+    }
 }

@@ -201,6 +201,7 @@ def test_training_is_heard_and_equals_that_of_the_command_line(place):
         assert np.array_equal(isomorph.open("other").carry(points), run.carry(points))
 
 
+@pytest.mark.filterwarnings("ignore::isomorph.IsomorphWarning")
 def test_a_bar_of_tqdm_follows_training_surfaces_and_batches(place, capsys):
     pytest.importorskip("tqdm")
     run = isomorph.morph(sphere(), sphere(0.5), preset="quick", run="run", frames=2, settings=SMALL, progress=True)

@@ -61,6 +61,7 @@ fn tetrahedra() -> Files {
         correspondence_fraction: 0.05,
         normals: NormalSource::Auto,
         mirrored: false,
+        sheets: None,
         seed: 9,
     };
     let (source, target) = (folder.path().join("a.obj"), folder.path().join("b.obj"));

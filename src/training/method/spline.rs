@@ -45,6 +45,7 @@ pub(super) static SPLINE: MethodSpec = MethodSpec {
         ("spline.spacing", "a field keeps its grid"),
         ("spline.coarse-shares", "a field keeps its grid"),
         ("spline.motion", "one field, or several"),
+        ("spline.sheet-thickness", "a field keeps its shapes"),
     ],
     // Presets of networks have far more steps.
     changes: &["training.steps=18"],
@@ -77,6 +78,10 @@ section! {
         /// jump. "pairs": from each to the next by itself, for cuts and comparisons.
         motion: Motion = "smooth" | "smooth" | "smooth" | "smooth" | "smooth",
             Rule::word(Motion::WORDS);
+        /// Thickness of an open sheet, such as cloth, which encloses nothing: its surface is as far as half of that from the
+        /// sheet.
+        sheet_thickness: f64 = 0.02 | 0.02 | 0.02 | 0.02 | 0.02,
+            Rule::number(0.0, 0.5).unit("normalised units").zero("closes sheets behind them by a cushion");
         /// Samples of the space around the moving surface in each step, where the regularisers act.
         band: usize = 24_000 | 24_000 | 24_000 | 24_000 | 24_000, Rule::whole(100, 10_000_000);
         /// Points of each surface in each step that must arrive on the other one.

@@ -15,6 +15,7 @@ data.clean-strays              1.5     1.4      1000000  1000001
 data.clean-part                0       -1e-9    1        1.001
 spline.spacing                 0.01     0.009    1        1.001
 spline.coarse-shares           [0]      [-1e-9]  [0.9]    [0.901]
+spline.sheet-thickness         0        -1e-9    0.5      0.501
 spline.band                    100      99       10000000 10000001
 spline.surface-samples         1        0        1000000  1000001
 spline.robust                  1e-9     0        1        1.001
