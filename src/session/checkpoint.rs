@@ -100,6 +100,12 @@ pub enum CheckpointError {
         /// What it said.
         reason: io::Error,
     },
+    /// The folder of the run is not where it was.
+    #[error(
+        "{0}: the folder is gone: it was moved or deleted while the run trained; put it back, and `isomorph resume` goes \
+         on from its newest checkpoint"
+    )]
+    Gone(PathBuf),
     /// There is none to start from.
     #[error(
         "{0}: no checkpoint here: the run stopped before its first one, or was moved without them; train again"
@@ -233,7 +239,8 @@ impl Checkpoint {
 /// Writes a checkpoint into `folder` and deletes all but the `keep` newest there; returns its path.
 ///
 /// # Errors
-/// [`CheckpointError::Io`]; nothing is left under the final name then.
+/// [`CheckpointError::Io`]; nothing is left under the final name then. [`CheckpointError::Gone`] if the folder that holds
+/// `folder` is not there any more: a new one in its place would have no recipe.
 pub(crate) fn save(
     folder: &Path,
     mut state: State,
@@ -247,7 +254,10 @@ pub(crate) fn save(
         .collect();
     let path = folder.join(format!("step-{:06}", state.step));
     let written = || -> io::Result<()> {
-        fs::create_dir_all(folder)?;
+        match fs::create_dir(folder) {
+            Err(reason) if reason.kind() != io::ErrorKind::AlreadyExists => return Err(reason),
+            _ => {}
+        }
         let temporary = tempfile::Builder::new()
             .prefix(TEMPORARY)
             .tempdir_in(folder)?;
@@ -267,9 +277,12 @@ pub(crate) fn save(
         let _ = temporary.keep();
         flush_folder(folder)
     };
-    written().map_err(|reason| CheckpointError::Io {
-        path: path.clone(),
-        reason,
+    written().map_err(|reason| match folder.parent() {
+        Some(run) if !run.exists() => CheckpointError::Gone(run.to_path_buf()),
+        _ => CheckpointError::Io {
+            path: path.clone(),
+            reason,
+        },
     })?;
     prune(folder, keep)?;
     Ok(path)

@@ -59,6 +59,29 @@ fn holds_a_line(path: &Path) -> bool {
 }
 
 #[test]
+fn a_folder_that_is_moved_away_meanwhile_is_said_and_goes_on_where_it_is_put_back() {
+    let _turn = turn();
+    let keys = [LONGER, &["training.guided-until = 0"]].concat();
+    let place = Workplace::tiny(&keys);
+    let child = start(&place, TRAIN);
+    wait_until("a checkpoint", || {
+        place.path("run/checkpoints/step-000025").exists()
+    });
+    fs::rename(place.path("run"), place.path("elsewhere")).expect("a free name");
+    let ended = end(child);
+    let said = String::from_utf8_lossy(&ended.stderr);
+    assert_eq!(ended.status.code(), Some(1), "{said}");
+    assert!(
+        said.contains("run: the folder is gone: it was moved or deleted"),
+        "{said}"
+    );
+    assert!(!place.path("run").exists(), "half a run in its place");
+    fs::rename(place.path("elsewhere"), place.path("run")).expect("a free name");
+    place.isomorph(RESUME).succeeded();
+    assert!(place.path("run/checkpoints/step-001000").exists());
+}
+
+#[test]
 fn a_run_killed_again_and_again_ends_in_the_same_networks() {
     let _turn = turn();
     // Each attempt would find the splines anew, and be killed before its first step.
