@@ -54,7 +54,7 @@ def morph(
         frames: the number of surfaces that are written into the folder.
         settings: keys of the recipe, as in `{"training": {"steps": 2000}}` or `{"training.steps": 2000}`.
         backend: what does the arithmetic of networks: "flex" or "ndarray" on processors, "wgpu" on GPUs.
-        device: of "wgpu": "default", "cpu", "discrete[:N]", "integrated[:N]" or "virtual[:N]".
+        device: of "wgpu": "default", "cpu", or a kind of GPU with an optional number, as in "discrete:1".
         on_event: called with each event of the work, a dict with the name `event`.
         progress: whether a bar of `tqdm` is shown; without it where nobody listens, `tqdm` is installed, and there is a
             terminal or a notebook.
