@@ -16,6 +16,7 @@
 //! | [`design`] | decisions of the program, and what they rest on |
 //! | [`performance`] | how long a step takes on a CPU and on a GPU |
 //! | [`python`] | isomorph from Python: arrays in, arrays out |
+//! | [`python_api`] | all functions of the package for Python |
 //! | [`robustness`] | what was tried to break isomorph: files, kills, disks, numbers, drivers |
 //! | [`carrying_on`] | for those who change isomorph: the map, worked examples, tests |
 //!

@@ -258,6 +258,7 @@ pub(crate) fn prepare(shapes: &[Shape], options: &DataOptions) -> Result<Keyfram
     let normalisation = Normalisation::of_areas(&all, &areas);
     let mut between: Vec<Vec<PointPair>> = Vec::with_capacity(options.between.len());
     let mut confidence = Vec::with_capacity(options.between.len());
+    let mut fit_mirrors = Vec::with_capacity(options.between.len());
     for (two, areas) in all.windows(2).zip(areas.windows(2)) {
         let two = [two[0], two[1]];
         notes.extend(mismatch::sizes(two, [areas[0], areas[1]]));
@@ -276,9 +277,7 @@ pub(crate) fn prepare(shapes: &[Shape], options: &DataOptions) -> Result<Keyfram
             rng,
             &mut notes,
         )?;
-        if !options.mirrored && mismatch::are_mirrored(&known.places) {
-            return Err(mirrored([&shapes[k], &shapes[k + 1]]));
-        }
+        fit_mirrors.push(mismatch::are_mirrored(&known.places));
         let place = |(from, to)| (normalisation.apply(from), normalisation.apply(to));
         between.push(known.places.into_iter().map(place).collect());
         confidence.push(known.confidence);
@@ -288,11 +287,10 @@ pub(crate) fn prepare(shapes: &[Shape], options: &DataOptions) -> Result<Keyfram
         keys.push(key_frame(k, shape, options, &normalisation, &mut notes)?);
     }
     for (k, pairs) in between.iter().enumerate() {
-        let clouds = [&keys[k].cloud, &keys[k + 1].cloud];
         // Normals as they are given need not be on one side.
         let are_outward = matches!(options.normals, NormalSource::Auto | NormalSource::Estimate);
-        let may_be = options.mirrored || !are_outward;
-        if !may_be && mismatch::are_turned_over(pairs, clouds) {
+        let clouds = are_outward.then(|| [&keys[k].cloud, &keys[k + 1].cloud]);
+        if !options.mirrored && mismatch::is_mirror(fit_mirrors[k], pairs, clouds) {
             return Err(mirrored([&shapes[k], &shapes[k + 1]]));
         }
     }

@@ -87,20 +87,23 @@ const LOOKED_AT: usize = 300;
 /// Neighbouring pairs that say how the surface maps there.
 const NEIGHBOURS: usize = 16;
 
-/// Pairs are mirrored if at this share of them the surface is turned over.
+/// Pairs are mirrored if at this share of them the surface is turned over, and are not if at this share it is not.
 const TURNED_OVER: f64 = 0.8;
 
 /// A map that flattens the surface to less than this share says nothing of its side.
 const FLAT: f64 = 0.05;
 
-/// Whether pairs map the surface of one shape to that of the other seen from behind, as a mirror does: about a pair, a
-/// turn to the left becomes one to the right, outside up. This also shows where a shape is nearly its own mirror image.
-pub(super) fn are_turned_over(pairs: &[PointPair], clouds: [&PointCloud; 2]) -> bool {
+/// The share of pairs about which the surface of one shape goes to that of the other seen from behind, as in a mirror: a
+/// turn to the left becomes one to the right, outside up. `None` if there are no normals or too few pairs.
+///
+/// This also shows where a shape is nearly its own mirror image, or nearly flat: what bends a plate the other way is close
+/// to a reflection.
+fn turned_over(pairs: &[PointPair], clouds: [&PointCloud; 2]) -> Option<f64> {
     let [Some(source), Some(target)] = clouds.map(|cloud| cloud.normals.as_ref()) else {
-        return false;
+        return None;
     };
     if pairs.len() <= 2 * NEIGHBOURS {
-        return false;
+        return None;
     }
     let wide = |x: [f32; 3]| x.map(f64::from);
     let search = clouds.map(|cloud| {
@@ -138,7 +141,17 @@ pub(super) fn are_turned_over(pairs: &[PointPair], clouds: [&PointCloud; 2]) -> 
     let step = pairs.len().div_ceil(LOOKED_AT);
     let sides: Vec<bool> = (0..pairs.len()).step_by(step).filter_map(side).collect();
     let over = sides.iter().filter(|over| **over).count();
-    sides.len() > NEIGHBOURS && over as f64 > TURNED_OVER * sides.len() as f64
+    (sides.len() > NEIGHBOURS).then(|| over as f64 / sides.len() as f64)
+}
+
+/// Whether pairs mirror one shape into another: about most of them, where normals say so, else all of them together.
+/// `fits` is whether a reflection alone fits them.
+pub(super) fn is_mirror(fits: bool, pairs: &[PointPair], clouds: Option<[&PointCloud; 2]>) -> bool {
+    match clouds.and_then(|clouds| turned_over(pairs, clouds)) {
+        Some(share) if share > TURNED_OVER => true,
+        Some(share) if share < 1.0 - TURNED_OVER => false,
+        _ => fits,
+    }
 }
 
 /// The sum of the area vectors of a mesh is nothing if it is closed, half of the area for half a sphere, and more for a
@@ -268,12 +281,13 @@ mod tests {
             }
         };
         let source = cloud(&|x| x, false);
+        let pairs = |target: &PointCloud, at: &dyn Fn(usize) -> usize| -> Vec<PointPair> {
+            let some = (0..source.points.len()).step_by(3);
+            some.map(|k| (source.points[k], target.points[at(k)]))
+                .collect()
+        };
         let found = |target: &PointCloud, at: &dyn Fn(usize) -> usize| {
-            let pairs = (0..source.points.len()).step_by(3);
-            let pairs: Vec<PointPair> = pairs
-                .map(|k| (source.points[k], target.points[at(k)]))
-                .collect();
-            are_turned_over(&pairs, [&source, target])
+            is_mirror(false, &pairs(target, at), Some([&source, target]))
         };
         let bent = |[x, y, z]: [f64; 3]| [x + 0.5 * y * y, y, z];
         assert!(!found(&cloud(&bent, false), &|k| k));
@@ -283,6 +297,14 @@ mod tests {
         };
         let target = cloud(&mirrored, true);
         assert!(found(&target, &|k| k));
+        // A reflection that fits all of them together is none where the surface is not turned over.
+        let same = cloud(&bent, false);
+        assert!(!is_mirror(
+            true,
+            &pairs(&same, &|k| k),
+            Some([&source, &same])
+        ));
+        assert!(is_mirror(true, &pairs(&same, &|k| k), None));
         // Pairs that are wrong everywhere say nothing.
         let count = source.points.len();
         assert!(!found(&target, &|k| (k * 7919) % count));

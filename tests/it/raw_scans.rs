@@ -179,6 +179,28 @@ fn a_result_that_is_not_its_input_is_called_so_and_strict_fails() {
         .refused(1, &["contradicts the shapes"]);
 }
 
+/// A reflection fits the pairs better than any rotation, and yet nothing is mirrored.
+#[test]
+fn a_sheet_that_bends_the_other_way_is_no_mirror_image() {
+    let place = Workplace::new();
+    place.write("a.ply", ply::text(&cloth(0.3)));
+    place.write("b.ply", ply::text(&cloth(-0.2)));
+    let morph = [
+        "morph", "a.ply", "b.ply", "-o", "run", "--frames", "2", "--strict",
+    ];
+    let more = ["--pairs", "same-vertices", "--set", "result.resolution=64"];
+    place
+        .isomorph(&[&morph[..], &more[..]].concat())
+        .succeeded();
+    // Seen in a mirror, with its outside where it was: that is refused.
+    let mut mirrored = cloth(0.3).map(|[x, y, z]| [-x, y, z]);
+    mirrored.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+    place.write("b.ply", ply::text(&mirrored));
+    place
+        .isomorph(&[&morph[..], &more[..], &["--force", "--quiet"]].concat())
+        .refused(1, &["the pairs mirror"]);
+}
+
 /// A square sheet of side 2, bent upwards by `bend` along x.
 fn cloth(bend: f64) -> Mesh {
     const SIDE: u32 = 24;
