@@ -6,10 +6,12 @@
 #   isomorph-VERSION-x86_64-linux.tar.gz     the program, with completions for shells and manual pages
 #
 # All is for Linux with glibc 2.17 or later (manylinux2014). Vector instructions are chosen when it runs, and the GPU's
-# part loads Vulkan only where it is used. Files go to FOLDER (default: target/wheels). Then the wheel is installed into
-# an empty virtual environment, where Rust is out of reach, and the example of the README's section on Python runs.
+# part loads Vulkan only where it is used. Files go to FOLDER (default: target/wheels). Then, where Rust is out of reach,
+# the program runs, the wheel is installed into an empty virtual environment, and the example of the README's section on
+# Python runs.
 #
-# Needs Rust and Python 3.10 with venv; maturin, cargo-zigbuild and zig come from PyPI. 18 minutes on two cores of an AMD EPYC, 2026-11-28.
+# Needs Rust, binutils and Python 3.10 with venv; maturin, cargo-zigbuild and zig come from PyPI. Takes 18 minutes on two
+# cores of an AMD EPYC, 2026-11-28.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 root=$PWD
@@ -20,13 +22,13 @@ tools=$root/target/wheel-tools
 export PATH=$tools/bin:$PATH CARGO_TARGET_DIR=$root/target/wheel-build
 place=$(mktemp -d)
 trap 'rm -rf "$place"' EXIT
-megabytes() { echo "$(basename "$1"): $(($(stat --format %s "$1") / 1000)) kB"; }
+size_of() { echo "$(basename "$1"): $(($(stat --format %s "$1") / 1000)) kB"; }
 
 mkdir -p "$folder"
 rm -f "$folder"/isomorph-*
 maturin sdist --out "$folder"
 sources=$(ls "$folder"/isomorph-*.tar.gz)
-megabytes "$sources"
+size_of "$sources"
 # One place, so that what is built already is not built again.
 rm -rf "$CARGO_TARGET_DIR/sources"
 mkdir -p "$CARGO_TARGET_DIR/sources"
@@ -46,7 +48,7 @@ strip "$kit/isomorph"
 "$kit/isomorph" completions zsh >"$kit/completions/_isomorph"
 "$kit/isomorph" completions fish >"$kit/completions/isomorph.fish"
 tar -czf "$folder/$(basename "$kit").tar.gz" -C "$place" "$(basename "$kit")"
-megabytes "$folder/$(basename "$kit").tar.gz"
+size_of "$folder/$(basename "$kit").tar.gz"
 newest=$(objdump -T "$kit/isomorph" | grep -o 'GLIBC_[0-9.]*' | sort --version-sort --unique | tail -n 1)
 [[ $(printf '%s\n' "$newest" GLIBC_2.17 | sort --version-sort | tail -n 1) == GLIBC_2.17 ]] || {
     echo "$kit/isomorph: needs $newest; GLIBC_2.17 is the oldest that is promised" >&2
@@ -59,7 +61,7 @@ cp data/fox/source.ply data/fox/target.ply "$place"
 tar -xzf "$folder/$(basename "$kit").tar.gz" -C "$place"
 (cd "$place" && bare "./$(basename "$kit")/isomorph" morph source.ply target.ply --output of-program)
 wheel=$(ls "$folder"/isomorph-*.whl)
-megabytes "$wheel"
+size_of "$wheel"
 python3 -m venv "$place/venv"
 start=$SECONDS
 "$place/venv/bin/pip" install --quiet "$wheel"

@@ -63,6 +63,18 @@ impl Backend {
         }
     }
 
+    /// The backend of a name, on a device or on the default one.
+    ///
+    /// # Errors
+    /// Those of parsing the name, and of [`Self::on`].
+    pub fn named(name: &str, device: Option<&str>) -> Result<Self, Error> {
+        let backend: Self = name.parse()?;
+        match device {
+            Some(device) => backend.on(device),
+            None => Ok(backend),
+        }
+    }
+
     /// The same backend on a device of this name.
     ///
     /// # Errors

@@ -106,11 +106,7 @@ const DEFAULT_BACKEND: &str = "flex";
 impl BackendArgs {
     /// The backend that was chosen.
     fn backend(&self) -> Result<Backend> {
-        let backend: Backend = self.backend.parse()?;
-        Ok(match &self.device {
-            Some(device) => backend.on(device)?,
-            None => backend,
-        })
+        Ok(Backend::named(&self.backend, self.device.as_deref())?)
     }
 }
 

@@ -75,29 +75,13 @@ impl Batch {
             share: Share::ALL,
         };
         let stop = StopFlag::default();
-        let mut caught = None;
-        let mut heard = |event: Option<serde_json::Value>| {
-            let told = Python::attach(|py| {
-                py.check_signals()?;
-                match on_event.as_ref().zip(event) {
-                    Some((callback, event)) => callback.call1(py, (event.to_string(),)).map(drop),
-                    None => Ok(()),
-                }
-            });
-            if let Err(error) = told {
-                caught.get_or_insert(error);
-                stop.set();
-            }
-        };
+        let mut watch = Watch::new(on_event, stop.clone());
         let ended = released(py, || {
             run(&self.0, &options, &stop, |told, ended| {
-                heard(event(&told, ended));
+                watch.hear_json(|| event(&told, ended));
             })
         });
-        if let Some(error) = caught {
-            return Err(error);
-        }
-        let ended = ended.map_err(raised)?;
+        let ended = watch.end(ended)?;
         Ok((ended.done, ended.failed, ended.left))
     }
 }

@@ -163,8 +163,7 @@ impl Run {
         let stop = StopFlag::default();
         let mut watch = Watch::new(on_event, stop.clone());
         let ended = released(py, || {
-            self.trained
-                .extract(&options, &stop, |event| watch.hear(event))
+            trained.extract(&options, &stop, |event| watch.hear(event))
         });
         watch.end(ended).map(drop)
     }

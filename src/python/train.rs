@@ -102,11 +102,7 @@ pub(crate) fn resume(
 
 /// The backend of a name, on a device.
 pub(crate) fn chosen(backend: &str, device: Option<&str>) -> PyResult<Backend> {
-    let backend: Backend = backend.parse().map_err(raised)?;
-    let backend = match device {
-        Some(device) => backend.on(device).map_err(raised)?,
-        None => backend,
-    };
+    let backend = Backend::named(backend, device).map_err(raised)?;
     allowed(&backend)?;
     Ok(backend)
 }

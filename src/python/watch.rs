@@ -2,6 +2,7 @@
 
 use isomorph::{Event, StopFlag};
 use pyo3::prelude::*;
+use serde_json::Value;
 
 /// What listens while the interpreter is free for other threads.
 pub(crate) struct Watch {
@@ -23,13 +24,21 @@ impl Watch {
     /// Hands an event on, as a JSON object in text, and looks for signals. After the first exception the work is to
     /// stop, and nothing more is called.
     pub(crate) fn hear(&mut self, event: &Event) {
+        self.hear_json(|| Some(event.json()));
+    }
+
+    /// The same of what is made only if somebody listens, and may be nothing.
+    pub(crate) fn hear_json(&mut self, event: impl FnOnce() -> Option<Value>) {
         if self.raised.is_some() {
             return;
         }
         let heard = Python::attach(|py| {
             py.check_signals()?;
             match &self.callback {
-                Some(callback) => callback.call1(py, (event.json().to_string(),)).map(drop),
+                Some(callback) => match event() {
+                    Some(event) => callback.call1(py, (event.to_string(),)).map(drop),
+                    None => Ok(()),
+                },
                 None => Ok(()),
             }
         });

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Callable, Iterable, Iterator, Mapping
 
 from . import _native
-from ._progress import batch_listener
+from ._progress import listener
 from ._run import Run, open
 from ._work import IsomorphWarning, Kept, changes, toml
 
@@ -85,7 +85,7 @@ class Batch:
         place = str(Path(__file__).resolve().parent.parent)
         code = f"import sys; sys.path.insert(0, {place!r}); from isomorph._job import main; main()"
         command = [sys.executable, "-c", code, str(self._file.resolve()), backend, device or ""]
-        with batch_listener(on_event, progress, len(self.names)) as heard:
+        with listener(on_event, progress, jobs=len(self)) as heard:
             self._native.run(command, jobs_at_a_time, backend, device, heard)
         found = self.status()
         for job in found:

@@ -15,16 +15,18 @@ def listener(
     on_event: Callable[[dict], object] | None,
     progress: bool | None,
     also: Callable[[dict], object] | None = None,
+    jobs: int | None = None,
 ) -> Iterator[Callable[[str], None] | None]:
     """What the native part calls with each event, as JSON. progress: None shows a bar where nobody listens, tqdm is
-    installed and somebody looks. also: a listener of this package, which leaves that as it is."""
+    installed and somebody looks. also: a listener of this package, which leaves that as it is.
+    jobs: how many, where the bar is that of a batch."""
     if progress is None:
         progress = on_event is None and watched() and find_spec("tqdm") is not None
     bar = None
     if progress:
         from tqdm.auto import tqdm
 
-        bar = tqdm(unit="step", leave=False)
+        bar = tqdm(total=jobs, unit="step" if jobs is None else "run", leave=False)
     # A bar without a length has no truth of its own.
     moved = None if bar is None else partial(follow, bar)
     listeners = [each for each in (also, on_event, moved) if each is not None]
@@ -45,30 +47,6 @@ def listener(
             bar.close()
 
 
-@contextmanager
-def batch_listener(
-    on_event: Callable[[dict], object] | None, progress: bool | None, jobs: int
-) -> Iterator[Callable[[str], None] | None]:
-    """The same for a batch of so many jobs: a bar that moves with each that is done."""
-    if progress is None:
-        progress = on_event is None and watched() and find_spec("tqdm") is not None
-    if not progress:
-        with listener(on_event, False) as heard:
-            yield heard
-        return
-    from tqdm.auto import tqdm
-
-    with tqdm(total=jobs, unit="run", leave=False) as bar:
-
-        def moved(event: dict) -> None:
-            bar.update(event["done"] + event["failed"] - bar.n)
-            if event["failed"]:
-                bar.set_postfix(failed=event["failed"])
-
-        with listener(on_event, False, also=moved) as heard:
-            yield heard
-
-
 def follow(bar, event: dict) -> None:
     """Moves the bar."""
     kind = event["event"]
@@ -84,6 +62,10 @@ def follow(bar, event: dict) -> None:
         bar.set_description("surfaces")
     elif kind == "extracted":
         bar.update(1)
+    elif kind.startswith("job_"):
+        bar.update(event["done"] + event["failed"] - bar.n)
+        if event["failed"]:
+            bar.set_postfix(failed=event["failed"])
 
 
 def watched() -> bool:

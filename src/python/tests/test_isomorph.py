@@ -237,23 +237,26 @@ def test_an_exception_of_a_callback_comes_out_and_leaves_a_checkpoint(place):
     assert isomorph.resume("run").metrics[-1]["step"] == 40
 
 
-@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
-def test_ctrl_c_leaves_a_checkpoint_that_is_resumed(place):
+def interrupt(place, call, run):
+    """Ctrl-C in the middle of a call that trains far too long on a.ply and b.ply, once `run` has logged something."""
     isomorph.Shape(*sphere()).save("a.ply")
     isomorph.Shape(*sphere(0.5)).save("b.ply")
     settings = SMALL | {"training": SMALL["training"] | {"steps": 100000}, "checkpoint.every": 100000}
-    code = (
-        "import isomorph, json, sys\n"
-        f"isomorph.morph('a.ply', 'b.ply', preset='quick', run='run', frames=0, settings=json.loads({json.dumps(settings)!r}))\n"
-    )
+    code = f"import isomorph, json\nsettings = json.loads({json.dumps(settings)!r})\n{call}\n"
     child = subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.PIPE, text=True)
-    metrics = place / "run/metrics.jsonl"
+    metrics = place / run / "metrics.jsonl"
     while not (metrics.exists() and metrics.stat().st_size):
         assert child.poll() is None, child.stderr.read()
         time.sleep(0.01)
     child.send_signal(signal.SIGINT)
     _, told = child.communicate(timeout=60)
     assert "KeyboardInterrupt" in told
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+def test_ctrl_c_leaves_a_checkpoint_that_is_resumed(place):
+    call = "isomorph.morph('a.ply', 'b.ply', preset='quick', run='run', frames=0, settings=settings)"
+    interrupt(place, call, "run")
     steps = [int(path.name.removeprefix("step-")) for path in (place / "run/checkpoints").iterdir()]
     assert len(steps) == 1 and 0 < steps[0] < 100000
     run = isomorph.resume("run", settings={"training.steps": steps[0] + 10})
@@ -411,22 +414,8 @@ def test_many_runs_go_on_after_a_failure_and_are_not_done_twice(place):
 
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 def test_ctrl_c_in_a_batch_leaves_checkpoints_of_what_was_at_work(place):
-    isomorph.Shape(*sphere()).save("a.ply")
-    isomorph.Shape(*sphere(0.5)).save("b.ply")
-    settings = SMALL | {"training": SMALL["training"] | {"steps": 100000}, "checkpoint.every": 100000}
-    code = (
-        "import isomorph, json\n"
-        f"settings = json.loads({json.dumps(settings)!r})\n"
-        "isomorph.Batch([('a.ply', 'b.ply')], folder='many', preset='quick', settings=settings).run(1)\n"
-    )
-    child = subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.PIPE, text=True)
-    metrics = place / "many/a-b/metrics.jsonl"
-    while not (metrics.exists() and metrics.stat().st_size):
-        assert child.poll() is None, child.stderr.read()
-        time.sleep(0.01)
-    child.send_signal(signal.SIGINT)
-    _, told = child.communicate(timeout=60)
-    assert "KeyboardInterrupt" in told
+    call = "isomorph.Batch([('a.ply', 'b.ply')], folder='many', preset='quick', settings=settings).run(1)"
+    interrupt(place, call, "many/a-b")
     [job] = isomorph.Batch("many.toml").status()
     assert job["state"] == "interrupted" and 0 < job["step"] < 100000
 
