@@ -40,9 +40,10 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::sync::OnceLock;
 
+use bytesize::ByteSize;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand};
-use isomorph::{Backend, ErrorKind, StopFlag};
+use isomorph::{Backend, ErrorKind, Session, StopFlag};
 
 use terminal::Terminal;
 
@@ -107,6 +108,24 @@ impl BackendArgs {
     /// The backend that was chosen.
     fn backend(&self) -> Result<Backend> {
         Ok(Backend::named(&self.backend, self.device.as_deref())?)
+    }
+}
+
+/// How much a run may take.
+#[derive(Clone, Copy, Debug, Args)]
+struct MemoryArgs {
+    /// Refuse a run that would take more memory, and end one that does with a checkpoint; such as 2GiB or 800MiB
+    #[arg(long, value_name = "SIZE")]
+    memory_limit: Option<ByteSize>,
+}
+
+impl MemoryArgs {
+    /// A session that takes no more.
+    fn limited(self, session: Session) -> Session {
+        match self.memory_limit {
+            Some(limit) => session.within_memory(limit.as_u64()),
+            None => session,
+        }
     }
 }
 

@@ -6,7 +6,7 @@ use clap::Args;
 use isomorph::{Event, Recipe, Session};
 
 use super::view::show;
-use super::{BackendArgs, Failure, ProgressArgs, Result, SetArgs, stop_on_interrupt};
+use super::{BackendArgs, Failure, MemoryArgs, ProgressArgs, Result, SetArgs, stop_on_interrupt};
 
 /// How a new run is made and shown.
 #[derive(Debug, Args)]
@@ -28,6 +28,9 @@ pub(super) struct NewRunArgs {
 
     #[command(flatten)]
     place: BackendArgs,
+
+    #[command(flatten)]
+    memory: MemoryArgs,
 
     #[command(flatten)]
     pub progress: ProgressArgs,
@@ -65,10 +68,11 @@ impl NewRunArgs {
     /// Trains a session and shows its events; the page of the run, if one was written.
     fn watched(
         &self,
-        mut session: Session,
+        session: Session,
         folder: &Path,
         mut on_event: impl FnMut(&Event),
     ) -> Result<Option<PathBuf>> {
+        let mut session = self.memory.limited(session);
         let mut terminal = self.progress.terminal(folder);
         let (mut page, mut contradicted) = (None, false);
         session.train(|event| {

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use isomorph::Session;
 
-use super::{BackendArgs, ProgressArgs, Result, SetArgs, stop_on_interrupt};
+use super::{BackendArgs, MemoryArgs, ProgressArgs, Result, SetArgs, stop_on_interrupt};
 
 /// Go on with an interrupted run, or train a finished one for longer
 ///
@@ -24,12 +24,16 @@ pub(super) struct ResumeArgs {
     place: BackendArgs,
 
     #[command(flatten)]
+    memory: MemoryArgs,
+
+    #[command(flatten)]
     progress: ProgressArgs,
 }
 
 pub(super) fn run(args: ResumeArgs) -> Result {
     let session = Session::resume(&args.run, &args.set.overrides, args.place.backend()?)?;
-    let mut session = session.stopped_by(stop_on_interrupt());
+    let session = session.stopped_by(stop_on_interrupt());
+    let mut session = args.memory.limited(session);
     let mut terminal = args.progress.terminal(&args.run);
     session.train(|event| terminal.show(event))?;
     Ok(())

@@ -6,7 +6,7 @@
 use crate::event::Event;
 use crate::geometry::density::usual_spacing;
 use crate::geometry::{Mesh, NeighbourSearch, TriangleSearch};
-use crate::shape::{Keyframe, key_name};
+use crate::shape::{Keyframe, LEAST_MISSING, key_name, share_beyond};
 use crate::surface::frames::Frame;
 use crate::surface::learned::Learned;
 
@@ -23,14 +23,8 @@ const BEYOND_MESH: f64 = 0.01;
 const BEYOND_CLOUD: f64 = 0.03;
 const SPACINGS: f64 = 1.0;
 
-/// What arrives so many spacings beyond the border of a shape has no counterpart.
-const FREE: f64 = 3.0;
-
 /// The most shapes that are all kept for this.
 const MOST_SHAPES: usize = 32;
-
-/// Less of a shape is not worth a note.
-const LEAST_SHARE: f64 = 0.02;
 
 /// How much the volume of a closed mesh may change, as a share.
 const VOLUME: f64 = 0.1;
@@ -134,17 +128,9 @@ impl End {
         let some: Vec<[f32; 3]> = some(&other.points).copied().collect();
         let motion = learned.motion().ok()?;
         let arrived = motion.carry(&some, other.time, self.time);
-        let wide = |x: &[f32; 3]| x.map(f64::from);
-        let points: Vec<[f64; 3]> = self.points.iter().map(wide).collect();
-        let search = NeighbourSearch::new(&points);
-        let spacing = usual_spacing(&points);
-        let is_free = |x: &&[f32; 3]| {
-            let near = search.nearest_one(wide(x));
-            self.border[near.index as usize] && near.squared_distance.sqrt() > FREE * spacing
-        };
-        let share = arrived.iter().filter(is_free).count() as f64 / arrived.len() as f64;
+        let share = share_beyond(&self.points, &self.border, &arrived);
         let (own, of) = (&self.name, &other.name);
-        (share > LEAST_SHARE).then(|| {
+        (share > LEAST_MISSING).then(|| {
             Event::Note(format!(
                 "{:.0} % of the {of} has no counterpart in the {own}: there the motion is a guess from what is near by",
                 100.0 * share

@@ -10,12 +10,12 @@ use isomorph_training::method;
 use isomorph_training::records::BURN_VERSION;
 
 use super::checkpoint::{self, Checkpoint, CheckpointError, State};
-use super::self_test;
+use super::{not_finite, self_test};
 use crate::event::{Event, StepReport, TermReport};
 use crate::memory;
 use crate::recipe::{Change, Recipe};
-use crate::shape::{Coordinates, Keyframes};
-use crate::solved::{Solved, guide};
+use crate::shape::{Coordinates, Keyframes, key_name, trained};
+use crate::solved::{Guidance, Solved, guide};
 
 /// Why training stopped before its last step.
 #[derive(Debug, thiserror::Error)]
@@ -73,6 +73,9 @@ pub enum LearnerError {
     /// The method does not run on the backend.
     #[error(transparent)]
     NotHere(#[from] NotHere),
+    /// Training has taken more memory than it may.
+    #[error("{0}")]
+    Memory(String),
     /// A checkpoint could not be written or read.
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
@@ -134,20 +137,20 @@ impl Learner {
         method::check(&recipe, &data).map_err(LearnerError::Missing)?;
         let mut notes = Vec::new();
         // What the networks train by, where it is not what the recipe says.
-        let mut trained = recipe.clone();
-        if method::is_guided(&recipe, step) {
+        let mut networks = recipe.clone();
+        let points = data.keys.iter().map(|key| key.points.len());
+        let given = (points.collect(), data.pair_count());
+        let is_guided = method::is_guided(&recipe, step);
+        let is_partial = keyframes.keys.iter().any(|key| !key.border.is_empty());
+        if is_guided || method::has_end_fields(&recipe) && is_partial {
             match guide(&recipe, keyframes) {
-                Ok(found) => data.guide = Some(found),
+                Ok(found) => notes.extend(guided(&mut data, found, keyframes, is_guided)),
                 Err(reason) => {
-                    trained.training.guided_until = 0.0;
-                    notes.push(format!(
-                        "V learns without splines, which takes twice as long: {reason} (training.guided-until)"
-                    ));
+                    networks.training.guided_until = 0.0;
+                    notes.extend(unguided(&reason, is_guided, is_partial));
                 }
             }
         }
-        let points = data.keys.iter().map(|key| key.points.len());
-        let given = (points.collect(), data.pair_count());
         let is_solved = method::spline::is_solved(&recipe);
         if is_solved {
             // No samples are drawn from them.
@@ -158,7 +161,7 @@ impl Learner {
             let solved = Solved::new(&recipe, keyframes).map_err(LearnerError::Unsolved)?;
             Box::new(solved)
         } else {
-            engine.method(&trained, &data.bounds)?
+            engine.method(&networks, &data.bounds)?
         };
         notes.extend(self_test::before_training(engine, &recipe)?);
         // A solver of our own, which no backend takes part in.
@@ -342,7 +345,12 @@ impl Learner {
                 self.step
             )));
         }
-        let what = format!("the {} term is {}", term.name, term.raw);
+        let mut what = format!("the {} term is {}", term.name, term.raw);
+        let deformation = self.trainer.deformation();
+        if let Some(place) = not_finite::place(&*deformation, &self.data.keys, &self.coordinates) {
+            what += "; ";
+            what += &place;
+        }
         Err(self.not_finite(what, checkpoints))
     }
 
@@ -408,6 +416,44 @@ impl Learner {
             correspondences: self.given.1,
         }
     }
+}
+
+/// Gives the data what splines have found: a motion to learn where there are guided steps, and shapes that are whole.
+/// What is said of it.
+fn guided(
+    data: &mut TrainingData,
+    found: Guidance,
+    keyframes: &Keyframes,
+    is_guided: bool,
+) -> Vec<String> {
+    let mut notes = Vec::new();
+    for (k, completed) in found.completed.into_iter().enumerate() {
+        let Some(cloud) = completed else { continue };
+        let (name, key) = (key_name(k, keyframes.keys.len()), &keyframes.keys[k]);
+        notes.push(format!(
+            "the {name} is known in part: where it is not, its end field learns what the motion brings there ({} points)",
+            cloud.points.len() - key.cloud.points.len()
+        ));
+        data.keys[k] = trained(key.time, &cloud);
+    }
+    data.guide = is_guided.then_some(found.guide);
+    notes
+}
+
+/// What is said where no splines are found.
+fn unguided(reason: &str, is_guided: bool, is_partial: bool) -> Vec<String> {
+    let mut notes = Vec::new();
+    if is_guided {
+        notes.push(format!(
+            "V learns without splines, which takes twice as long: {reason} (training.guided-until)"
+        ));
+    }
+    if is_partial {
+        notes.push(format!(
+            "a shape that is known in part stays cut where it ends, without splines: {reason}"
+        ));
+    }
+    notes
 }
 
 /// Whether training can go on from a checkpoint with this recipe and these shapes.

@@ -17,7 +17,9 @@
 //! | `bench.rs`, `bench_run.rs` | what a step and what a whole run costs on this machine |
 //! | `describe.rs` | what a file or a run is |
 //! | `prepare.rs` | the shapes of a recipe made ready |
+//! | `memory_need.rs` | how much memory a run takes |
 //! | `learner.rs` | the loop that trains a method |
+//! | `not_finite.rs` | where a method in training has no number |
 //! | `learned.rs` | from a method or a checkpoint to surfaces and motion |
 //! | `folder.rs`, `lock.rs`, `checkpoint.rs` | the folder of a run, for one process, and whole checkpoints or none |
 //! | `self_test.rs` | a device held against a processor before it trains |
@@ -43,10 +45,12 @@ pub(crate) mod learner;
 mod lock;
 mod log;
 mod measure;
+mod memory_need;
 pub(crate) mod metrics;
 pub(crate) mod morph;
 mod morph_size;
 pub(crate) mod normals;
+mod not_finite;
 pub(crate) mod pace;
 pub(crate) mod pairs;
 mod prepare;

@@ -1,5 +1,6 @@
 //! A run in training, from its recipe or from its newest checkpoint.
 
+use std::cell::Cell;
 use std::path::{Path, PathBuf};
 
 use isomorph_training::engine::{Engine, Trainer};
@@ -11,6 +12,7 @@ use super::learned::{self, Frame};
 use super::learner::{self, Learner, LearnerError, Outcome};
 use super::lock::RunLock;
 use super::log::RunLog;
+use super::memory_need::{MemoryNeed, exceeded};
 use super::prepare::{self, Prepared};
 use super::state::FAILED;
 use super::stop::StopFlag;
@@ -66,6 +68,8 @@ pub struct Session {
     engine: Box<dyn Engine>,
     stop: StopFlag,
     output: Output,
+    /// Bytes of memory that it may take.
+    memory_limit: Option<u64>,
 }
 
 /// What is written of the surfaces at the end of training.
@@ -117,6 +121,7 @@ impl Session {
             start: Start::New { replace: false },
             stop: StopFlag::default(),
             output: Output::default(),
+            memory_limit: None,
         })
     }
 
@@ -147,6 +152,7 @@ impl Session {
             },
             stop: StopFlag::default(),
             output: Output::default(),
+            memory_limit: None,
         })
     }
 
@@ -169,6 +175,15 @@ impl Session {
     #[must_use]
     pub fn writing(mut self, format: OutputFormat, carry: bool) -> Self {
         self.output = Output { format, carry };
+        self
+    }
+
+    /// Takes no more than so many bytes of memory: [`Self::train`] refuses a run that would, before anything is
+    /// written, and ends one that does at its next report, with a checkpoint. Memory of a graphics card is not
+    /// part of it.
+    #[must_use]
+    pub fn within_memory(mut self, bytes: u64) -> Self {
+        self.memory_limit = Some(bytes);
         self
     }
 
@@ -212,6 +227,9 @@ impl Session {
     }
 
     fn train_dyn(&mut self, on_event: &mut dyn FnMut(&Event)) -> Result<Trained> {
+        if let Some(limit) = self.memory_limit {
+            MemoryNeed::of(&self.recipe, &self.sizes()).within(limit)?;
+        }
         let mut begun = match &self.start {
             Start::New { replace } => self.begin(*replace, on_event)?,
             Start::GoOn { .. } => self.go_on(on_event)?,
@@ -280,8 +298,18 @@ impl Session {
         on_event: &mut dyn FnMut(&Event),
     ) -> std::result::Result<Outcome, LearnerError> {
         let (run, log) = (&begun.run, &mut begun.log);
+        let limit = self.memory_limit.unwrap_or(u64::MAX);
+        let over = Cell::new(None);
         let mut emit = |event: Event| {
             on_event(&event);
+            let peak = match &event {
+                Event::Step(report) => report.peak_memory_bytes,
+                _ => None,
+            };
+            if let Some(peak) = peak.filter(|peak| *peak > limit) {
+                over.set(Some(peak));
+                self.stop.set();
+            }
             log.record(&event)
         };
         let (recipe, frame) = (&self.recipe, &begun.frame);
@@ -292,9 +320,15 @@ impl Session {
             shown.map_err(|error| error.to_string())
         };
         let (checkpoints, stop) = (run.checkpoints(), self.stop.flag());
-        begun
+        let outcome = begun
             .learner
-            .run_with(&checkpoints, stop, &mut emit, &mut preview)
+            .run_with(&checkpoints, stop, &mut emit, &mut preview)?;
+        match over.get() {
+            Some(peak) if outcome == Outcome::Interrupted => {
+                Err(LearnerError::Memory(exceeded(peak, limit)))
+            }
+            _ => Ok(outcome),
+        }
     }
 
     /// The run at its newest checkpoint, with half of all learning rates, and the step of that. Where training came

@@ -73,6 +73,39 @@ fn widest_sector(points: &[[f32; 3]], normal: [f32; 3], k: usize, near: &[Neighb
         .fold(round, f32::max)
 }
 
+/// A place has no counterpart if the nearest point is at the border and further away than so many spacings.
+const BEYOND: f64 = 3.0;
+
+/// Less than this share of a shape that has no counterpart is within what a border's place is off.
+pub(crate) const LEAST_MISSING: f64 = 0.02;
+
+/// Which places lie more than so many spacings beyond the border of points.
+pub(super) fn beyond(
+    points: &[[f32; 3]],
+    border: &[bool],
+    places: &[[f32; 3]],
+    spacings: f64,
+) -> Vec<bool> {
+    let wide = |x: &[f32; 3]| x.map(f64::from);
+    let points: Vec<[f64; 3]> = points.iter().map(wide).collect();
+    let (search, spacing) = (NeighbourSearch::new(&points), usual_spacing(&points));
+    let is_beyond = |x: &[f32; 3]| {
+        let near = search.nearest_one(wide(x));
+        border[near.index as usize] && near.squared_distance.sqrt() > spacings * spacing
+    };
+    places.par_iter().map(is_beyond).collect()
+}
+
+/// The share of places that lie beyond the border of points; 0 without a border.
+pub(crate) fn share_beyond(points: &[[f32; 3]], border: &[bool], places: &[[f32; 3]]) -> f64 {
+    if border.is_empty() || places.is_empty() {
+        return 0.0;
+    }
+    let beyond = beyond(points, border, places, BEYOND);
+    let count = beyond.iter().filter(|is| **is).count();
+    count as f64 / places.len() as f64
+}
+
 /// Where a shape is known: in full away from its border, not at all at it and beyond.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Known {

@@ -5,24 +5,21 @@
 //! [`Keyframes::notes`].
 
 use std::borrow::Cow;
-use std::num::NonZeroUsize;
 use std::path::PathBuf;
-use std::sync::OnceLock;
 
-use isomorph_training::data::{KeyPoints, PointPair, Surroundings, TrainingData};
+use isomorph_training::data::PointPair;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::border;
 use super::coordinates::{Coordinates, Placements};
 use super::correspond::Correspondences;
-use super::distance::SignedDistance;
 use super::mismatch;
 use super::normalise::Normalisation;
 use super::points::{NormalSource, closed, points_of};
 use super::sample::{point_at, sample_surface};
 use crate::formats::{FEWEST_POINTS, Shape, ShapeError};
-use crate::geometry::{Bounds, Mesh, NeighbourSearch, turned_outwards};
+use crate::geometry::{Bounds, Mesh, turned_outwards};
 
 /// Where correspondences come from.
 #[derive(Debug, Clone, PartialEq)]
@@ -147,62 +144,16 @@ impl Keyframes {
                 .collect(),
         )
     }
-
-    /// The points as methods sample them.
-    pub fn training_data(&self) -> TrainingData {
-        let keys = self.keys.iter().map(|key| KeyPoints {
-            time: key.time as f32,
-            points: key.cloud.points.clone(),
-            normals: key.cloud.normals.clone(),
-            around: Box::new(Around::new(&key.cloud)),
-        });
-        TrainingData::new(keys.collect(), self.between.clone())
-    }
-}
-
-/// Searches around a cloud, each made on its first use: most methods need none.
-struct Around {
-    cloud: PointCloud,
-    distance: OnceLock<SignedDistance>,
-    search: OnceLock<NeighbourSearch>,
-}
-
-impl Around {
-    fn new(cloud: &PointCloud) -> Self {
-        Self {
-            cloud: cloud.clone(),
-            distance: OnceLock::new(),
-            search: OnceLock::new(),
-        }
-    }
-}
-
-impl Surroundings for Around {
-    fn signed_distance(&self, x: [f32; 3]) -> Option<f32> {
-        let normals = self.cloud.normals.as_ref()?;
-        let distance = self
-            .distance
-            .get_or_init(|| SignedDistance::new(&self.cloud.points, normals));
-        Some(distance.at(x))
-    }
-
-    fn nearest(&self, point: usize, count: NonZeroUsize) -> Vec<usize> {
-        let search = self.search.get_or_init(|| {
-            let points = self.cloud.points.iter();
-            let points: Vec<[f64; 3]> = points.map(|point| point.map(f64::from)).collect();
-            NeighbourSearch::new(&points)
-        });
-        let found = search.nearest(self.cloud.points[point].map(f64::from), count);
-        found.iter().map(|found| found.index as usize).collect()
-    }
 }
 
 /// What is drawn at random; each has its own stream, so that no choice shifts another. The numbers are those
 /// of two shapes from the first release on: they stay, so that a seed keeps its samples.
 #[derive(Clone, Copy)]
-enum Draw {
+pub(super) enum Draw {
     /// Of the key frame with this number.
     Points(usize),
+    /// Of what completes one of two shapes.
+    Completing(usize),
     /// From the key frame with this number to the next.
     Correspondences(usize),
 }
@@ -211,11 +162,12 @@ enum Draw {
 const STREAMS: u64 = 1 << 40;
 
 impl Draw {
-    fn generator(self, seed: u64) -> ChaCha8Rng {
+    pub(super) fn generator(self, seed: u64) -> ChaCha8Rng {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(match self {
             Self::Points(key @ 0..=1) => key as u64,
             Self::Correspondences(0) => 2,
+            Self::Completing(key) => 3 + key as u64,
             // Far above the streams of training.
             Self::Points(key) => u64::MAX - STREAMS + key as u64,
             Self::Correspondences(key) => u64::MAX - 2 * STREAMS + key as u64,

@@ -18,7 +18,9 @@
 //! | `normalise.rs` | the joint frame in which the networks work, and the way back |
 //! | `coordinates.rs` | the same where shapes were laid onto each other, at any time |
 //! | `points.rs` | the points, normals and closed mesh of one shape |
-//! | `keyframes.rs` | all of it in order: shapes in, [`Keyframes`] ready for training out |
+//! | `keyframes.rs` | all of it in order: shapes in, [`Keyframes`] out |
+//! | `completing.rs` | a shape that is known in part with points where it is not |
+//! | `trained.rs` | key frames as methods sample them |
 //!
 //! The files are read in [`crate::formats`], points and meshes are measured in [`crate::geometry`].
 //!
@@ -27,6 +29,7 @@
 
 mod border;
 mod clean;
+mod completing;
 mod coordinates;
 mod correspond;
 mod distance;
@@ -42,10 +45,13 @@ mod reconstruct;
 mod sample;
 mod sides;
 mod solid;
+mod trained;
 
 pub(crate) use crate::formats::{FEWEST_POINTS, Shape, ShapeError};
 pub(crate) use crate::geometry::{Bounds, NeighbourSearch};
+pub(crate) use border::{LEAST_MISSING, share_beyond};
 pub use clean::CleanOptions;
+pub(crate) use completing::complete;
 pub(crate) use coordinates::{Coordinates, Place, Placements};
 pub(crate) use correspond::Correspondences;
 pub(crate) use keyframes::key_name;
@@ -56,3 +62,4 @@ pub(crate) use normals::estimate_normals;
 pub(crate) use points::{NormalSource, points_of};
 pub(crate) use sample::{SurfaceSamples, sample_surface};
 pub(crate) use solid::{Solid, SolidParts};
+pub(crate) use trained::trained;

@@ -4,9 +4,10 @@
 use isomorph_spline::{Solver, SplineError, SplineField};
 use isomorph_training::data::Guide;
 
+use super::completed::completed;
 use super::problem::{options, problem, weights};
 use crate::recipe::{Recipe, RecipeError};
-use crate::shape::Keyframes;
+use crate::shape::{Keyframes, PointCloud};
 
 /// A solved field, and in how many steps its paths are followed.
 struct SplineGuide {
@@ -24,6 +25,14 @@ impl Guide for SplineGuide {
         self.field
             .carry_each(places, from, to, self.trajectory_steps)
     }
+}
+
+/// What a field that is solved for gives to the training of networks.
+pub(crate) struct Guidance {
+    /// The field.
+    pub guide: Box<dyn Guide>,
+    /// For each shape that is known in part, its points and those that complete it.
+    pub completed: [Option<PointCloud>; 2],
 }
 
 /// Keys of the steps, which the recipe's own say nothing of.
@@ -52,8 +61,9 @@ fn misfit(recipe: &Recipe, keyframes: &Keyframes) -> Option<&'static str> {
 /// Solves for the field that the recipe would have with the preset `instant`: its own weights and seed are kept.
 ///
 /// # Errors
-/// A motion that splines do not have, or what the solver refuses: the reason, as a part of a sentence.
-pub(crate) fn guide(recipe: &Recipe, keyframes: &Keyframes) -> Result<Box<dyn Guide>, String> {
+/// A motion that splines do not have, what the solver refuses, or a surface that is not found: the reason, as a part
+/// of a sentence.
+pub(crate) fn guide(recipe: &Recipe, keyframes: &Keyframes) -> Result<Guidance, String> {
     if let Some(reason) = misfit(recipe, keyframes) {
         return Err(reason.to_owned());
     }
@@ -70,8 +80,12 @@ pub(crate) fn guide(recipe: &Recipe, keyframes: &Keyframes) -> Result<Box<dyn Gu
         }
         Ok(solver.field().clone())
     })();
-    Ok(Box::new(SplineGuide {
-        field: found.map_err(|error| error.to_string())?,
-        trajectory_steps,
-    }))
+    let field = found.map_err(|error| error.to_string())?;
+    Ok(Guidance {
+        completed: completed(&field, recipe, keyframes)?,
+        guide: Box::new(SplineGuide {
+            field,
+            trajectory_steps,
+        }),
+    })
 }

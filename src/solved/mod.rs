@@ -9,7 +9,8 @@
 //! | `carried.rs` | surfaces and motion of its field between two shapes |
 //! | `sequence.rs` | the same through many key frames |
 //! | `shapes.rs` | the shapes that it carries |
-//! | `guide.rs` | the field as what a network learns first |
+//! | `guide.rs` | the field as what networks learn first |
+//! | `completed.rs` | what networks learn of a shape that is known in part |
 //! | `stored.rs` | its part of a checkpoint |
 //! | `arrays.rs` | the same as plain arrays, for other programs |
 //!
@@ -17,6 +18,7 @@
 
 mod arrays;
 mod carried;
+mod completed;
 mod guide;
 mod motion;
 mod problem;
@@ -39,7 +41,7 @@ use rayon::prelude::*;
 
 pub(crate) use self::arrays::arrays;
 use self::carried::CarriedShapes;
-pub(crate) use self::guide::guide;
+pub(crate) use self::guide::{Guidance, guide};
 use self::motion::{AnySolver, Field};
 use self::sequence::CarriedSequence;
 use self::shapes::Shapes;

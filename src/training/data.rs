@@ -2,8 +2,12 @@
 //! known of which points correspond.
 
 use std::num::NonZeroUsize;
+use std::sync::OnceLock;
 
 use serde::{Deserialize, Serialize};
+
+use crate::hollows::Hollows;
+use crate::recipe::TrainingRecipe;
 
 /// An axis-aligned box in normalised coordinates.
 #[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Debug)]
@@ -106,7 +110,13 @@ pub struct TrainingData {
     pub bounds: Bounds,
     /// What the velocity field learns from first, where the recipe says so.
     pub guide: Option<Box<dyn Guide>>,
+    /// Found on first use.
+    pub(crate) hollows: OnceLock<Vec<Hollows>>,
 }
+
+/// A hollow is looked after if its middle is at least so many widths of the widest band away from the surface: the
+/// band seldom reaches further.
+const BANDS: f64 = 1.0;
 
 impl TrainingData {
     /// Key frames at ascending times with the correspondences from each to the next.
@@ -123,7 +133,19 @@ impl TrainingData {
             keys,
             between,
             guide: None,
+            hollows: OnceLock::new(),
         }
+    }
+
+    /// The hollows of each key frame within the box of a recipe.
+    pub(crate) fn hollows(&self, training: &TrainingRecipe) -> &[Hollows] {
+        self.hollows.get_or_init(|| {
+            let bounds = self.bounds.padded(training.box_margin as f32);
+            let widest = training.band_widths.iter().copied().fold(0.0, f64::max);
+            let depth = (BANDS * widest) as f32;
+            let of = |key| Hollows::of(key, &bounds, depth);
+            self.keys.iter().map(of).collect()
+        })
     }
 
     /// How many correspondences are known in all.

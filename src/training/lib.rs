@@ -10,6 +10,7 @@
 //! | `recipe/` | the TOML file that decides a run, typed, checked and printed back |
 //! | `data.rs` | key frames as points: what methods draw their samples from |
 //! | `samples.rs` | the samples of a step, on the host, and their equal parts |
+//! | `hollows.rs` | where a surface encloses space that is not inside |
 //! | `guided.rs` | what V learns from a field that is there already |
 //! | `method/` | what is trained: the default method and those that it is compared with, one file each |
 //! | `settings.rs` | the recipe in the model's types |
@@ -40,6 +41,7 @@ pub mod engine;
 pub mod flop;
 mod flow_step;
 pub mod guided;
+mod hollows;
 pub mod method;
 mod motion;
 mod network_step;

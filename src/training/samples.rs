@@ -279,15 +279,25 @@ impl Batch {
 pub struct EndBatch {
     /// Given points, half of `training.batch`, in equal numbers for each key frame and in their order.
     pub surface: Samples,
-    /// Points near each surface (the band) and in the box, the other half; the same times and order.
+    /// Points near each surface (the band) and in the box, the other half; the same times and order. Of those
+    /// in the box, a part lies in the hollows of a shape that has some.
     pub space: Samples,
     /// Times in `[0, 1]`, one for each point of `space`: for terms between the key frames.
     pub between: Vec<f32>,
 }
 
+/// The share of a key frame's samples of the box that lie in its hollows, where it has some.
+const IN_HOLLOWS: f64 = 0.5;
+
 impl EndBatch {
-    /// The samples of `step`, of each kind a multiple of [`parts`].
-    pub fn draw(data: &TrainingData, training: &TrainingRecipe, step: usize) -> Self {
+    /// The samples of `step`, of each kind a multiple of [`parts`]. Hollows are looked after where signed
+    /// distances are `measured`: without these nothing is known of them.
+    pub fn draw(
+        data: &TrainingData,
+        training: &TrainingRecipe,
+        step: usize,
+        measured: bool,
+    ) -> Self {
         let stream = |purpose| stream(training.seed, step, purpose);
         let parts = parts(training.batch);
         let count = (training.batch / 2 / data.keys.len() / parts).max(1) * parts;
@@ -295,13 +305,22 @@ impl EndBatch {
         let bounds = data.bounds.padded(training.box_margin as f32);
         let (mut surface, mut space) = (Samples::default(), Samples::default());
         let (of_surface, of_space) = (&mut stream(Purpose::Surface), &mut stream(Purpose::Space));
-        for key in &data.keys {
+        let hollows = if measured {
+            data.hollows(training)
+        } else {
+            &[]
+        };
+        for (key, number) in data.keys.iter().zip(0..) {
             pick(key, count, &mut surface, of_surface);
+            let hollow = hollows.get(number).filter(|hollow| !hollow.is_empty());
+            let filled = band + ((count - band) as f64 * IN_HOLLOWS).round() as usize;
             for k in 0..count {
                 space.points.push(if k < band {
                     let near = key.points[of_space.random_range(0..key.points.len())];
                     let by = offset(training, of_space);
                     std::array::from_fn(|axis| near[axis] + by[axis])
+                } else if let Some(hollow) = hollow.filter(|_| k < filled) {
+                    hollow.draw(of_space)
                 } else {
                     within(&bounds, of_space)
                 });

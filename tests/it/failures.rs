@@ -157,3 +157,33 @@ fn a_large_mesh_has_a_page_of_a_few_megabytes() {
     let page = std::fs::metadata(place.path("run/report.html")).expect("a page");
     assert!(page.len() < 6_000_000, "{} bytes", page.len());
 }
+
+#[test]
+fn a_run_that_takes_too_much_memory_is_refused_with_the_number_that_would_do() {
+    let _turn = turn();
+    let place = spheres();
+    let limited = |limit: &str| {
+        let options = ["-o", "run", "--quiet", "--memory-limit", limit];
+        morph(&place, ["a.ply", "b.ply"], &options)
+    };
+    let refused = limited("100MiB");
+    refused.refused(2, &["up to", "MiB", "100 MiB are allowed", "data.points"]);
+    assert!(!place.path("run").exists());
+    let said = &refused.stderr;
+    let enough = said
+        .split("up to ")
+        .nth(1)
+        .and_then(|rest| rest.split(' ').next());
+    let enough = format!("{}MiB", enough.expect("a number"));
+    limited(&enough).succeeded();
+    // It has taken no more than was foreseen.
+    let metrics = std::fs::read_to_string(place.path("run/metrics.jsonl")).expect("metrics");
+    let peak = metrics.split("\"peak_memory_bytes\":").last();
+    let peak = peak.and_then(|rest| rest.split(['}', ',']).next());
+    let peak: u64 = peak.and_then(|text| text.parse().ok()).expect("a peak");
+    let enough: u64 = enough.trim_end_matches("MiB").parse().expect("a number");
+    assert!(peak <= enough << 20, "{peak} of {enough} MiB");
+    let misread = limited("1 apple");
+    assert_eq!(misread.code, Some(2), "{misread:?}");
+    assert!(misread.stderr.contains("--memory-limit"), "{misread:?}");
+}

@@ -329,3 +329,19 @@ fn derivatives_can_be_differentiated_by_the_positions_both_ways() {
         assert!(size > 1e-2, "a gradient to compare: {size}");
     }
 }
+
+#[test]
+fn the_length_of_nothing_is_a_number_and_so_is_its_gradient() {
+    let rows = points::<Train>(&[[0.0; 3], [2.0, -3.0, 6.0]]).require_grad();
+    let lengths = length(rows.clone());
+    // The root of 1e-12, and 7.
+    let [nothing, seven] = host(lengths.clone().inner())[..] else {
+        panic!("two rows");
+    };
+    assert!((0.0..1e-5).contains(&nothing), "{nothing}");
+    assert!((seven - 7.0).abs() < 1e-5, "{seven}");
+    let gradients = lengths.sum().backward();
+    let of_rows = host(rows.grad(&gradients).expect("it takes part"));
+    assert!(of_rows.iter().all(|part| part.is_finite()), "{of_rows:?}");
+    assert!((of_rows[5] - 6.0 / 7.0).abs() < 1e-5, "{of_rows:?}");
+}

@@ -214,7 +214,7 @@ impl<B: TrainBackend> Method<B> for EndsAndCouplings<B> {
             _ => BatchSizes::new(training, data).matched,
         };
         Drawn {
-            ends: EndBatch::draw(data, training, step),
+            ends: EndBatch::draw(data, training, step, self.settings.loss.distance > 0.0),
             batch: Batch {
                 matched: Matched::draw(data, training.seed, step, count),
                 ..Batch::default()

@@ -182,6 +182,11 @@ impl<B: TrainBackend, M: EndNet<B>> EndFit<B, M> {
             settings,
         }
     }
+
+    /// Whether signed distances take part in a step.
+    fn measured(&self) -> bool {
+        M::DISTANCES || self.settings.loss.distance > 0.0
+    }
 }
 
 impl<B: TrainBackend, M: EndNet<B>> Method<B> for EndFit<B, M> {
@@ -206,14 +211,13 @@ impl<B: TrainBackend, M: EndNet<B>> Method<B> for EndFit<B, M> {
 
     fn draw(&self, data: &TrainingData, step: usize) -> Drawn {
         Drawn {
-            ends: EndBatch::draw(data, &self.settings.training, step),
+            ends: EndBatch::draw(data, &self.settings.training, step, self.measured()),
             ..Drawn::default()
         }
     }
 
     fn objective(&self, data: &TrainingData, drawn: &Drawn, _: usize) -> Posed<B> {
-        let measured = M::DISTANCES || self.settings.loss.distance > 0.0;
-        let drawn = OnDevice::new(data, &drawn.ends, measured, &self.device);
+        let drawn = OnDevice::new(data, &drawn.ends, self.measured(), &self.device);
         let net = self.net.replica();
         Posed::new(net.terms(&self.recipe, &self.settings, &drawn)).by(net)
     }

@@ -133,7 +133,8 @@ impl<B: TrainBackend> Method<B> for EndsAndFlow<B> {
             ends: 0,
             ..BatchSizes::new(training, data)
         };
-        let ends = EndBatch::draw(data, training, step);
+        let measured = self.settings.loss.distance > 0.0;
+        let ends = EndBatch::draw(data, training, step, measured);
         if self.phase(step) == Phase::Guided {
             return Drawn {
                 guided: Guided::draw(data, training, sizes, step),

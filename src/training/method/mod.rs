@@ -124,6 +124,11 @@ pub fn is_guided(recipe: &Recipe, step: usize) -> bool {
     flow::is_guided(recipe, step)
 }
 
+/// Whether networks of the recipe are fitted to the shapes at their times, and a motion carries them.
+pub fn has_end_fields(recipe: &Recipe) -> bool {
+    *spec_of(recipe) == flow::FLOW
+}
+
 /// The method of a name, where several have it that of the kind of V and of the geometry.
 pub(crate) fn spec(
     name: &str,

@@ -211,7 +211,7 @@ impl<B: TrainBackend> Method<B> for Evolved<B> {
 
     fn draw(&self, data: &TrainingData, step: usize) -> Drawn {
         Drawn {
-            ends: EndBatch::draw(data, &self.settings.training, step),
+            ends: EndBatch::draw(data, &self.settings.training, step, false),
             ..Drawn::default()
         }
     }

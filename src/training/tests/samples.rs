@@ -1,8 +1,11 @@
 //! Samples, their streams, and the parts into which they are divided.
 
+use std::num::NonZeroUsize;
+
 use burn::module::ParamId;
 
 use super::*;
+use crate::data::Surroundings;
 use crate::samples::{Batch, BatchSizes, EndBatch, parts};
 
 #[test]
@@ -71,7 +74,7 @@ fn no_two_kinds_of_sample_share_their_random_numbers() {
     let sizes = BatchSizes::new(training, &data);
     let kinds = |step: usize| {
         let batch = Batch::draw(&data, training, sizes, step);
-        let ends = EndBatch::draw(&data, training, step);
+        let ends = EndBatch::draw(&data, training, step, true);
         let source = |points: &[[f32; 3]]| points[..points.len() / 2].to_vec();
         [
             ("ends", source(&batch.ends.points)),
@@ -91,7 +94,7 @@ fn no_two_kinds_of_sample_share_their_random_numbers() {
     }
     // The same numbers for a time and for a coordinate would show as equal shares.
     let batch = Batch::draw(&data, training, sizes, 5);
-    let between = EndBatch::draw(&data, training, 5).between;
+    let between = EndBatch::draw(&data, training, 5, true).between;
     let shared = batch.stops.iter().zip(&between).filter(|(a, b)| a == b);
     let inner = shared.filter(|(a, _)| **a > 0.0 && **a < 1.0).count();
     assert!(inner < LUCK, "{inner} times");
@@ -170,7 +173,7 @@ fn parts_are_a_function_of_the_batch_alone_and_hold_every_sample_once() {
         let (training, of) = (&recipe.training, parts(batch));
         let drawn = Drawn {
             batch: Batch::draw(&data, training, BatchSizes::new(training, &data), 2),
-            ends: EndBatch::draw(&data, training, 2),
+            ends: EndBatch::draw(&data, training, 2, true),
             ..Drawn::default()
         };
         let share = |index: usize| drawn.part(Part { index, of });
@@ -199,4 +202,52 @@ fn parts_are_a_function_of_the_batch_alone_and_hold_every_sample_once() {
         points.sort_by(|a, b| a.partial_cmp(b).expect("numbers"));
         assert_eq!(united, points, "{batch}");
     }
+}
+
+/// A ball of radius 0.4 with a hollow of radius 0.3.
+struct Hollow;
+
+impl Surroundings for Hollow {
+    fn signed_distance(&self, x: [f32; 3]) -> Option<f32> {
+        let r = radius(x);
+        Some((r - 0.4).max(0.3 - r))
+    }
+
+    fn nearest(&self, _: usize, _: NonZeroUsize) -> Vec<usize> {
+        Vec::new()
+    }
+}
+
+fn radius(x: [f32; 3]) -> f32 {
+    x.iter().map(|part| part * part).sum::<f32>().sqrt()
+}
+
+#[test]
+fn half_of_the_samples_of_the_box_lie_in_a_hollow_where_distances_are_measured() {
+    let mut data = data();
+    // Those of the band are near the points, far from the hollow.
+    for key in &mut data.keys {
+        key.points = vec![[5.0, 0.0, 0.0]; 10];
+        key.normals = Some(vec![[1.0, 0.0, 0.0]; 10]);
+    }
+    data.keys[1].around = Box::new(Hollow);
+    let recipe = recipe(&["training.batch=2200", "training.band-share=0.75"]);
+    let share = |measured: bool| {
+        let drawn = EndBatch::draw(&data, &recipe.training, 7, measured);
+        [0.0, 1.0].map(|time| {
+            let space = drawn.space.points.iter().zip(&drawn.space.times);
+            let in_box = space.filter(|(x, t)| **t == time && x[0] < 3.0);
+            let (mut deep, mut all) = (0.0, 0.0);
+            for (x, _) in in_box {
+                all += 1.0;
+                deep += f64::from(u8::from(radius(*x) < 0.3));
+            }
+            deep / all
+        })
+    };
+    // The hollow has 0.11 of a box of about 1.
+    let [source, target] = share(true);
+    assert!(source < 0.2 && target > 0.5, "{source} {target}");
+    let [source, target] = share(false);
+    assert!(source < 0.2 && target < 0.2, "{source} {target}");
 }

@@ -38,28 +38,38 @@ fn assert_near(got: f64, wanted: f64) {
 #[test]
 fn the_terms_on_hand_worked_points() {
     assert_near(scalar(data::data(column(&[0.5, -1.5]))), 1.0);
-    assert_near(scalar(eikonal::eikonal(column(&[1.0, 3.0]))), 2.0);
+    assert_near(scalar(eikonal::eikonal(column(&[1.0, 4.0]))), 4.5);
     let f = jet(
         &[0.0, 0.0],
         &[[2.0, 0.0, 0.0], [0.0, 3.0, 0.0]],
         &[0.0, 0.0],
     );
-    let given = points(&[[1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]);
-    assert_near(scalar(normals::normals(&f, given)), 1.0);
-    let (a, b) = (points(&[[3.0, 4.0, 0.0]]), points(&[[0.0, 0.0, 0.0]]));
+    let given = points(&[[1.0, 0.0, 0.0], [0.0, 0.6, 0.8]]);
+    assert_near(scalar(normals::normals(&f, given)), 0.2);
+    let (a, b) = (points(&[[2.0, 5.0, -1.0]]), points(&[[-1.0, 1.0, -1.0]]));
     assert_near(scalar(matching::matching(a.clone(), b.clone(), 0.0)), 5.0);
-    assert_near(scalar(matching::matching(a, b, 2.5)), 2.5 * 4.0 / 5.0);
+    for (scale, ratio) in [(2.5, 2.0f64), (5.0, 1.0), (20.0, 0.25)] {
+        let robust = scale * ratio.powi(2) / (ratio.powi(2) + 1.0);
+        assert_near(
+            scalar(matching::matching(a.clone(), b.clone(), scale)),
+            robust,
+        );
+    }
     let v = expansion(&[[1.0, 0.0, 0.0], [0.0, 2.0, 0.0]]);
     assert_near(scalar(divergence::divergence(&v)), 3.0);
     assert_near(scalar(strain::strain(&v, 0.0)), 3.0);
     assert_near(scalar(strain::strain(&v, 1.0)), 2.0);
     // D = I: V_t + D V = (0, 0, 2) + x.
     assert_near(scalar(screw::screw(&v)), (5.0 + 8.0) / 2.0);
+    let along = expansion(&[[0.0, 0.0, 3.0]]);
+    assert_near(scalar(screw::screw(&along)), 25.0);
     // V - 0.5 * (0, 3, 0): (1, -1.5, 0) and (0, 0.5, 0).
     assert_near(
         scalar(smoothness::smoothness(&v, 0.5, 1.0)),
         (3.25f64.sqrt() + 0.5) / 2.0,
     );
+    // 2 V - 0.5 * (0, 3, 0): (2, -1.5, 0) and (0, 2.5, 0).
+    assert_near(scalar(smoothness::smoothness(&v, 0.5, 2.0)), 2.5);
     // Two far away, off by 0.3 and 0.1, and one so near that the term says nothing.
     let (f, d) = (column(&[0.2, -0.3, 0.9]), column(&[-0.1, -0.4, 0.01]));
     assert_near(scalar(distance::distance(f, d)), 0.4 / 3.0);
@@ -121,4 +131,17 @@ fn an_expanding_sphere_solves_the_level_set_equation_with_lambda_one_and_no_othe
     for (lambda, wanted) in [(1.0, 0.0), (0.0, off), (10.0, 9.0 * off)] {
         assert_near(scalar(level_set::level_set(&f, &v, lambda)), wanted);
     }
+}
+
+#[test]
+fn the_level_set_equation_takes_the_stretch_along_the_normal_times_the_value() {
+    // f = 0.5 with the normal e_x, V = (0.2, 0, 0) with dV_x / dx = 3: 0.2 - 0.5 * 3.
+    let f = jet(&[0.5], &[[1.0, 0.0, 0.0]], &[0.0]);
+    let v = VelocityJet::<Plain> {
+        value: points(&[[0.2, 0.0, 0.0]]),
+        jacobian: points::<Plain>(&[[3.0, 0.0, 0.0], [0.0; 3], [0.0; 3]]).reshape([1, 3, 3]),
+        laplacian: None,
+        rate: None,
+    };
+    assert_near(scalar(level_set::level_set(&f, &v, 1.0)), 1.3);
 }

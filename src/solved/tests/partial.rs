@@ -1,0 +1,122 @@
+//! A scan that shows a part of a shape: how the rest moves, and what networks learn of it.
+
+use super::*;
+use crate::formats::Shape;
+use crate::geometry::{NeighbourSearch, TriangleSearch};
+use crate::shape::{CorrespondenceSource, Correspondences, DataOptions, NormalSource, prepare};
+
+/// Up to which height the target is seen: a third of it is missing.
+const SEEN: f64 = 0.1;
+
+/// A bumpy ball, the same 0.2 further, and both as key frames, the second without what is higher than it is seen.
+fn half_seen() -> ([Mesh<f64>; 2], Keyframes) {
+    let ball = bumpy_sphere(60);
+    let moved = ball.moved(|[x, y, z]| [x + 0.2, y, z]);
+    let normals = ball.vertex_normals();
+    let seen: Vec<usize> = (0..ball.vertices.len())
+        .filter(|k| ball.vertices[*k][2] < SEEN)
+        .collect();
+    let target = Shape::of(Mesh {
+        vertices: seen.iter().map(|k| moved.vertices[*k]).collect(),
+        triangles: Vec::new(),
+        normals: Some(seen.iter().map(|k| normals[*k]).collect()),
+    });
+    let pairs = seen.iter().zip(0..).map(|(k, at)| [*k as u32, at]);
+    let options = DataOptions {
+        times: vec![0.0, 1.0],
+        between: vec![CorrespondenceSource::Pairs(Correspondences {
+            pairs: pairs.collect(),
+            ..Correspondences::none()
+        })],
+        points: 6000,
+        correspondence_fraction: 0.1,
+        normals: NormalSource::Auto,
+        mirrored: false,
+        sheets: None,
+        seed: 0,
+    };
+    let keyframes = prepare(&[Shape::of(ball.clone()), target], &options).expect("shapes");
+    assert!(keyframes.keys[1].border.contains(&true));
+    ([ball, moved], keyframes)
+}
+
+fn mean(values: &[f32]) -> f32 {
+    values.iter().map(|x| x.abs()).sum::<f32>() / values.len() as f32
+}
+
+#[test]
+fn what_a_scan_does_not_show_moves_with_its_neighbours_and_is_there_at_the_end() {
+    let ([ball, moved], keyframes) = half_seen();
+    let recipe = recipe(&["training.steps=12", "spline.band=8000"]);
+    let deformation = trained(&recipe, &keyframes).deformation();
+    let (field, motion) = (
+        deformation.field().expect("one"),
+        deformation.motion().expect("one"),
+    );
+    let frame = &keyframes.normalisation;
+    let hidden: Vec<usize> = (0..ball.vertices.len())
+        .filter(|k| ball.vertices[*k][2] > 0.15)
+        .collect();
+    let of = |mesh: &Mesh<f64>| -> Vec<[f32; 3]> {
+        hidden
+            .iter()
+            .map(|k| frame.apply(mesh.vertices[*k]))
+            .collect()
+    };
+    let carried = motion.carry(&of(&ball), 0.0, 1.0);
+    let misses = carried.iter().zip(of(&moved));
+    let lengths = misses.map(|(a, b)| (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f32>().sqrt());
+    let miss = mean(&lengths.collect::<Vec<_>>());
+    // The way is 0.14 in these units. Drawn into the cut, the cap would be off by about as much.
+    assert!(miss < 0.02, "{miss}");
+    for time in [0.5, 1.0] {
+        let there = motion.carry(&of(&ball), 0.0, time);
+        let off = mean(&field.values(&there, time));
+        assert!(off < 0.005, "{off} at {time}");
+    }
+}
+
+#[test]
+fn networks_learn_the_whole_shape_with_points_where_it_is_not_seen() {
+    let ([_, moved], keyframes) = half_seen();
+    let mut network = Recipe::between("a.ply", "b.ply").expect("two files");
+    network.with("preset=quick").expect("a recipe");
+    let guidance = guide(&network, &keyframes).expect("a field");
+    let [source, target] = guidance.completed;
+    assert_eq!(source, None);
+    let (whole, given) = (target.expect("it is cut"), &keyframes.keys[1].cloud);
+    let count = given.points.len();
+    assert_eq!(whole.points[..count], given.points[..]);
+    let added = &whole.points[count..];
+    let normals = &whole.normals.expect("as those given")[count..];
+    assert_eq!(normals.len(), added.len());
+    // On the surface that is not seen, and there alone.
+    let frame = &keyframes.normalisation;
+    let truth = moved.moved(|x| frame.apply(x));
+    let search = TriangleSearch::new(&truth).expect("it has area");
+    let closest = |x: &[f32; 3]| search.closest(*x, 0);
+    let off: Vec<f32> = added.iter().map(|x| closest(x).squared.sqrt()).collect();
+    assert!(mean(&off) < 0.02, "{}", mean(&off));
+    let cut = frame.apply([0.0, 0.0, SEEN])[2];
+    assert!(added.iter().all(|x| x[2] > cut - 0.02));
+    let of_truth = truth.vertex_normals();
+    let vertices: Vec<[f64; 3]> = truth.vertices.iter().map(|x| x.map(f64::from)).collect();
+    let by_vertex = NeighbourSearch::new(&vertices);
+    let along = added.iter().zip(normals).map(|(x, n)| {
+        let near = by_vertex.nearest_one(x.map(f64::from));
+        let own = of_truth[near.index as usize];
+        (0..3).map(|i| own[i] * n[i]).sum::<f32>()
+    });
+    let along = along.sum::<f32>() / added.len() as f32;
+    assert!(along > 0.95, "{along}");
+    // As dense as the points that are given.
+    let [mut seen, mut hidden] = [0.0; 2];
+    for triangle in &truth.triangles {
+        let high = truth.vertices[triangle[0] as usize][2] > cut;
+        let area = truth.triangle_area(*triangle);
+        *(if high { &mut hidden } else { &mut seen }) += area;
+    }
+    let expected = count as f64 * hidden / seen;
+    let share = added.len() as f64 / expected;
+    assert!((0.8..1.2).contains(&share), "{share}");
+}
