@@ -15,7 +15,7 @@ use crate::event::{Event, StepReport, TermReport};
 use crate::memory;
 use crate::recipe::{Change, Recipe};
 use crate::shape::{Coordinates, Keyframes, key_name, trained};
-use crate::solved::{Guidance, Solved, guide};
+use crate::solved::{Guidance, Solved, encloses, guide};
 
 /// Why training stopped before its last step.
 #[derive(Debug, thiserror::Error)]
@@ -141,7 +141,7 @@ impl Learner {
         let points = data.keys.iter().map(|key| key.points.len());
         let given = (points.collect(), data.pair_count());
         let is_guided = method::is_guided(&recipe, step);
-        let is_partial = keyframes.keys.iter().any(|key| !key.border.is_empty());
+        let is_partial = !keyframes.keys.iter().all(encloses);
         if is_guided || method::has_end_fields(&recipe) && is_partial {
             match guide(&recipe, keyframes) {
                 Ok(found) => notes.extend(guided(&mut data, found, keyframes, is_guided)),
@@ -430,10 +430,13 @@ fn guided(
     for (k, completed) in found.completed.into_iter().enumerate() {
         let Some(cloud) = completed else { continue };
         let (name, key) = (key_name(k, keyframes.keys.len()), &keyframes.keys[k]);
-        notes.push(format!(
-            "the {name} is known in part: where it is not, its end field learns what the motion brings there ({} points)",
-            cloud.points.len() - key.cloud.points.len()
-        ));
+        // Of a sheet it is said when it is read.
+        if key.sheet.is_none() {
+            notes.push(format!(
+                "the {name} is known in part: where it is not, its end field learns what the motion brings there ({} points)",
+                cloud.points.len() - key.cloud.points.len()
+            ));
+        }
         data.keys[k] = trained(key.time, &cloud);
     }
     data.guide = is_guided.then_some(found.guide);
@@ -450,7 +453,7 @@ fn unguided(reason: &str, is_guided: bool, is_partial: bool) -> Vec<String> {
     }
     if is_partial {
         notes.push(format!(
-            "a shape that is known in part stays cut where it ends, without splines: {reason}"
+            "a shape that encloses nothing is closed by a bulge or a cushion, without splines: {reason}"
         ));
     }
     notes

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use isomorph_training::method::spline::{self, is_solved};
+use isomorph_training::method::spline::is_solved;
 
 use super::align::{Aligned, aligned};
 use crate::error::Result;
@@ -16,6 +16,7 @@ use crate::shape::{
     self, CleanOptions, Coordinates, CorrespondenceSource, Correspondences, DataOptions, Keyframes,
     NormalSource, Placements,
 };
+use crate::solved::sheet_thickness;
 
 /// Shapes ready for training.
 pub(super) struct Prepared {
@@ -183,7 +184,7 @@ fn options(recipe: &Recipe, between: Vec<CorrespondenceSource>) -> DataOptions {
             recipe::NormalSource::None => NormalSource::None,
         },
         mirrored: section.mirrored,
-        sheets: is_solved(recipe).then(|| spline::keys(recipe).sheet_thickness),
+        sheets: sheet_thickness(recipe),
         seed: recipe.training.seed,
     }
 }

@@ -1,15 +1,23 @@
-//! A shape that is known in part, with points where it is not: from a surface that completes it.
+//! Shapes that enclose nothing, with points of a surface that does: a shape that is known in part, with points where it
+//! is not, and an open sheet with its thickness.
+
+use rand_distr::{Distribution, UnitSphere};
 
 use super::border::beyond;
 use super::keyframes::{Draw, Keyframe, PointCloud};
 use super::sample::sample_surface;
+use super::solid::Solid;
 use crate::geometry::Mesh;
+use crate::geometry::linear::unit;
 
 /// Of a surface at least this share is taken to be known: what is sampled grows with its inverse.
 const LEAST_KNOWN: f64 = 0.05;
 
 /// How far beyond the border points are added, in spacings of those that are given: as far as these are apart.
 const APART: f64 = 1.0;
+
+/// Steps back onto the surface of a sheet: one is exact but for rounding, and where a far part of it is nearer.
+const BACK: usize = 2;
 
 /// The points of key frame `k` of two and, of a surface that is whole, those beyond their border, as dense; with
 /// normals, which `normals` gives at points. `None` if the surface has no area.
@@ -50,4 +58,28 @@ pub(crate) fn complete(
         normals
     });
     Some(PointCloud { points, normals })
+}
+
+/// The surface of a sheet that has a thickness, by as many points as its key frame `k` has: on both sides and around the
+/// rim. `solid` is the sheet with its thickness; `None` if the key frame is no such sheet.
+pub(crate) fn thicken(key: &Keyframe, k: usize, solid: &Solid, seed: u64) -> Option<PointCloud> {
+    let sheet = key.sheet.as_ref()?;
+    let mut rng = Draw::Completing(k).generator(seed);
+    let mut away = |x: &[f32; 3]| {
+        let by: [f64; 3] = UnitSphere.sample(&mut rng);
+        [0, 1, 2].map(|axis| x[axis] + sheet.thickness * by[axis] as f32)
+    };
+    // Twice as far from the sheet as its surface is, and back along the gradient of the distance.
+    let mut points: Vec<[f32; 3]> = key.cloud.points.iter().map(&mut away).collect();
+    for _ in 0..BACK {
+        let (values, gradients) = (solid.distances(&points), solid.gradients(&points));
+        for (x, (value, gradient)) in points.iter_mut().zip(values.iter().zip(&gradients)) {
+            *x = [0, 1, 2].map(|axis| x[axis] - value * gradient[axis]);
+        }
+    }
+    let normals = solid.gradients(&points).into_iter().map(unit).collect();
+    Some(PointCloud {
+        points,
+        normals: Some(normals),
+    })
 }

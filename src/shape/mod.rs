@@ -51,7 +51,7 @@ pub(crate) use crate::formats::{FEWEST_POINTS, Shape, ShapeError};
 pub(crate) use crate::geometry::{Bounds, NeighbourSearch};
 pub(crate) use border::{LEAST_MISSING, share_beyond};
 pub use clean::CleanOptions;
-pub(crate) use completing::complete;
+pub(crate) use completing::{complete, thicken};
 pub(crate) use coordinates::{Coordinates, Place, Placements};
 pub(crate) use correspond::Correspondences;
 pub(crate) use keyframes::key_name;

@@ -3,6 +3,7 @@
 
 use isomorph_spline::{Solver, SplineError, SplineField};
 use isomorph_training::data::Guide;
+use isomorph_training::method::{self, spline};
 
 use super::completed::completed;
 use super::problem::{options, problem, weights};
@@ -58,6 +59,26 @@ fn misfit(recipe: &Recipe, keyframes: &Keyframes) -> Option<&'static str> {
     }
 }
 
+/// The recipe with the preset `instant`.
+fn as_solved(recipe: &Recipe) -> Result<Recipe, RecipeError> {
+    let mut solved = recipe.clone();
+    solved.with_all(&OF_STEPS.map(str::to_owned))?;
+    Ok(solved)
+}
+
+/// How thick an open sheet is, normalised: as the recipe says, or with networks as the splines have it that they learn
+/// first. `None` where a method closes it by a cushion.
+pub(crate) fn sheet_thickness(recipe: &Recipe) -> Option<f64> {
+    if spline::is_solved(recipe) {
+        return Some(spline::keys(recipe).sheet_thickness);
+    }
+    if !method::has_end_fields(recipe) {
+        return None;
+    }
+    let solved = as_solved(recipe).ok()?;
+    Some(spline::keys(&solved).sheet_thickness)
+}
+
 /// Solves for the field that the recipe would have with the preset `instant`: its own weights and seed are kept.
 ///
 /// # Errors
@@ -67,10 +88,7 @@ pub(crate) fn guide(recipe: &Recipe, keyframes: &Keyframes) -> Result<Guidance, 
     if let Some(reason) = misfit(recipe, keyframes) {
         return Err(reason.to_owned());
     }
-    let mut solved = recipe.clone();
-    let keys = OF_STEPS.map(str::to_owned);
-    let changed: Result<(), RecipeError> = solved.with_all(&keys);
-    changed.map_err(|error| error.to_string())?;
+    let solved = as_solved(recipe).map_err(|error| error.to_string())?;
     let options = options(&solved);
     let trajectory_steps = 2 * options.trajectory_steps;
     let found: Result<SplineField, SplineError> = (|| {

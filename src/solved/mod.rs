@@ -41,7 +41,8 @@ use rayon::prelude::*;
 
 pub(crate) use self::arrays::arrays;
 use self::carried::CarriedShapes;
-pub(crate) use self::guide::{Guidance, guide};
+pub(crate) use self::completed::encloses;
+pub(crate) use self::guide::{Guidance, guide, sheet_thickness};
 use self::motion::{AnySolver, Field};
 use self::sequence::CarriedSequence;
 use self::shapes::Shapes;

@@ -138,6 +138,14 @@ mod tests {
     }
 
     #[test]
+    fn the_guided_steps_end_where_their_share_does() {
+        let half = ["training.steps=10", "training.guided-until=0.5"];
+        let half = schedule(Preset::Quick, &half);
+        let guided = (0..10).filter(|step| half.is_guided(*step));
+        assert_eq!(guided.collect::<Vec<_>>(), [0, 1, 2, 3, 4]);
+    }
+
+    #[test]
     fn a_cosine_falls_over_the_span_in_which_its_network_trains() {
         let quick = schedule(
             Preset::Quick,

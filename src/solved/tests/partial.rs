@@ -1,4 +1,4 @@
-//! A scan that shows a part of a shape: how the rest moves, and what networks learn of it.
+//! Shapes that enclose nothing: how what a scan does not show moves, and what networks learn of it and of a sheet.
 
 use super::*;
 use crate::formats::Shape;
@@ -119,4 +119,64 @@ fn networks_learn_the_whole_shape_with_points_where_it_is_not_seen() {
     let expected = count as f64 * hidden / seen;
     let share = added.len() as f64 / expected;
     assert!((0.8..1.2).contains(&share), "{share}");
+}
+
+#[test]
+fn networks_learn_a_sheet_with_its_thickness_on_both_sides_and_around_its_rim() {
+    // A square of side 1 that moves up by 0.3 and bends.
+    let count = 24;
+    let place = |k: usize| k as f64 / count as f64 - 0.5;
+    let at = |i: usize, j: usize| i * (count + 1) + j;
+    let rows = (0..=count).flat_map(|i| (0..=count).map(move |j| [i, j]));
+    let corner = |[i, j]: [usize; 2]| [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+    let cells = (0..count).flat_map(|i| (0..count).map(move |j| [i, j]));
+    let triangles = cells
+        .map(corner)
+        .flat_map(|c| [[c[0], c[1], c[2]], [c[0], c[2], c[3]]]);
+    let flat: Mesh<f64> = Mesh::new(
+        rows.map(|[i, j]| [place(i), place(j), 0.0]).collect(),
+        triangles.map(|t| t.map(|k| k as u32)).collect(),
+    );
+    let bent = flat.moved(|[x, y, _]| [x, y, 0.3 + 0.2 * x * x]);
+    let mut network = Recipe::between("a.ply", "b.ply").expect("two files");
+    network.with("preset=quick").expect("a recipe");
+    let thickness = sheet_thickness(&network).expect("as instant has it");
+    let options = DataOptions {
+        times: vec![0.0, 1.0],
+        between: vec![CorrespondenceSource::SameVertices],
+        points: 8000,
+        correspondence_fraction: 0.1,
+        normals: NormalSource::Auto,
+        mirrored: false,
+        sheets: Some(thickness),
+        seed: 0,
+    };
+    let keyframes = prepare(&[Shape::of(flat), Shape::of(bent)], &options).expect("shapes");
+    let completed = guide(&network, &keyframes).expect("a field").completed;
+    let half = thickness as f32 / 2.0;
+    for (key, found) in keyframes.keys.iter().zip(completed) {
+        let (cloud, sheet) = (found.expect("it is a sheet"), key.sheet.as_ref());
+        let search = sheet.and_then(|sheet| TriangleSearch::new(&sheet.mesh));
+        let search = search.expect("it has area");
+        assert_eq!(cloud.points.len(), key.cloud.points.len());
+        let off = |x: &[f32; 3]| (search.closest(*x, 0).squared.sqrt() - half).abs();
+        assert!(cloud.points.iter().all(|x| off(x) < 1e-4));
+        // It encloses the sheet, as points on one side alone would not.
+        let around = crate::shape::trained(key.time, &cloud).around;
+        let mut wrong = 0;
+        for x in key.cloud.points.iter().step_by(40) {
+            let [inside, over, under] = [0.0, 0.04, -0.04].map(|by| {
+                let place = [x[0], x[1], x[2] + by];
+                around.signed_distance(place).expect("normals")
+            });
+            wrong += usize::from(inside >= 0.0) + usize::from(over.min(under) <= 0.0);
+        }
+        // The points are half as far apart as it is thick.
+        assert!(wrong <= 2, "{wrong} of 400");
+        // The rim: normals that point away from the middle, in the plane of the sheet.
+        let normals = cloud.normals.expect("its own");
+        let upright = normals.iter().filter(|n| n[2].abs() > 0.5).count();
+        let rim = normals.len() - upright;
+        assert!(rim > 0 && rim < normals.len() / 10, "{rim}");
+    }
 }
