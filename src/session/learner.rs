@@ -1,88 +1,26 @@
 //! The loop that trains a method, from the first step or from a checkpoint, on whichever backend.
 
-use std::path::{Path, PathBuf};
+mod error;
+mod guided;
+
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use isomorph_training::data::TrainingData;
-use isomorph_training::engine::{Engine, NotHere, Trainer};
+use isomorph_training::engine::{Engine, Trainer};
 use isomorph_training::method;
 use isomorph_training::records::BURN_VERSION;
 
-use super::checkpoint::{self, Checkpoint, CheckpointError, State};
+pub(crate) use self::error::LearnerError;
+use self::guided::{guided, unguided};
+use super::checkpoint::{self, Checkpoint, State};
 use super::{not_finite, self_test};
 use crate::event::{Event, StepReport, TermReport};
 use crate::memory;
-use crate::recipe::{Change, Recipe};
-use crate::shape::{Coordinates, Keyframes, key_name, trained};
-use crate::solved::{Guidance, Solved, encloses, guide};
-
-/// Why training stopped before its last step.
-#[derive(Debug, thiserror::Error)]
-pub enum LearnerError {
-    /// A term of the objective or a weight is not a number any more.
-    #[error(
-        "step {step}: {what}; {last}; try a smaller training.learning-rate, or let training go back by itself with checkpoint.step-backs=3"
-    )]
-    NotFinite {
-        /// The step, counted from 1.
-        step: usize,
-        /// The first such term and its value, or the network.
-        what: String,
-        /// Where the last good checkpoint is.
-        last: String,
-    },
-    /// The method needs what the shapes do not have.
-    #[error("{0}")]
-    Missing(String),
-    /// Splines cannot be solved for where networks could be trained.
-    #[error("{0}")]
-    Unsolved(String),
-    /// The networks of the recipe are not those of the checkpoint.
-    #[error(
-        "{path}: {} is {} in the checkpoint and {} in the recipe: {why}; restore the value, or start a new run",
-        change.key, change.before, change.after
-    )]
-    OtherNetworks {
-        /// The checkpoint.
-        path: PathBuf,
-        /// What differs.
-        change: Change,
-        /// Why it may not.
-        why: &'static str,
-    },
-    /// The shapes are not those of the checkpoint.
-    #[error(
-        "{0}: the shapes are not those that this run was started with (their joint size or place differs); restore the files, or start a new run"
-    )]
-    OtherShapes(PathBuf),
-    /// The device computes something else than a processor does.
-    #[error(
-        "{device}: computes wrong numbers: the {what} is off by {off:.1e} of its size, and {allowed:.0e} is allowed; update the driver, choose another device with --device, or train with --backend flex"
-    )]
-    WrongNumbers {
-        /// The device.
-        device: String,
-        /// What it computed.
-        what: String,
-        /// How far off, relative to the processor's result.
-        off: f64,
-        /// What is allowed.
-        allowed: f64,
-    },
-    /// The method does not run on the backend.
-    #[error(transparent)]
-    NotHere(#[from] NotHere),
-    /// Training has taken more memory than it may.
-    #[error("{0}")]
-    Memory(String),
-    /// A checkpoint could not be written or read.
-    #[error(transparent)]
-    Checkpoint(#[from] CheckpointError),
-    /// An event could not be recorded, or networks not be encoded.
-    #[error("{0}")]
-    Record(#[from] std::io::Error),
-}
+use crate::recipe::Recipe;
+use crate::shape::{Coordinates, Keyframes};
+use crate::solved::{Solved, encloses, guide};
 
 /// How a run ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -416,47 +354,6 @@ impl Learner {
             correspondences: self.given.1,
         }
     }
-}
-
-/// Gives the data what splines have found: a motion to learn where there are guided steps, and shapes that are whole.
-/// What is said of it.
-fn guided(
-    data: &mut TrainingData,
-    found: Guidance,
-    keyframes: &Keyframes,
-    is_guided: bool,
-) -> Vec<String> {
-    let mut notes = Vec::new();
-    for (k, completed) in found.completed.into_iter().enumerate() {
-        let Some(cloud) = completed else { continue };
-        let (name, key) = (key_name(k, keyframes.keys.len()), &keyframes.keys[k]);
-        // Of a sheet it is said when it is read.
-        if key.sheet.is_none() {
-            notes.push(format!(
-                "the {name} is known in part: where it is not, its end field learns what the motion brings there ({} points)",
-                cloud.points.len() - key.cloud.points.len()
-            ));
-        }
-        data.keys[k] = trained(key.time, &cloud);
-    }
-    data.guide = is_guided.then_some(found.guide);
-    notes
-}
-
-/// What is said where no splines are found.
-fn unguided(reason: &str, is_guided: bool, is_partial: bool) -> Vec<String> {
-    let mut notes = Vec::new();
-    if is_guided {
-        notes.push(format!(
-            "V learns without splines, which takes twice as long: {reason} (training.guided-until)"
-        ));
-    }
-    if is_partial {
-        notes.push(format!(
-            "a shape that encloses nothing is closed by a bulge or a cushion, without splines: {reason}"
-        ));
-    }
-    notes
 }
 
 /// Whether training can go on from a checkpoint with this recipe and these shapes.

@@ -3,7 +3,7 @@
 //!
 //! | file | what it holds |
 //! |---|---|
-//! | `train.rs` | [`Session`]: a run from its recipe, or from its newest checkpoint |
+//! | `train.rs`, `train/begun.rs` | [`Session`]: a run from its recipe, or from its newest checkpoint |
 //! | `trained.rs` | [`Trained`]: a run that is opened, and what can be asked of it |
 //! | `against_input.rs` | the surfaces at the ends held against the shapes that were given |
 //! | `extract.rs` | the surfaces of a run as files, with a picture of them |
@@ -18,7 +18,7 @@
 //! | `describe.rs` | what a file or a run is |
 //! | `prepare.rs` | the shapes of a recipe made ready |
 //! | `memory_need.rs` | how much memory a run takes |
-//! | `learner.rs` | the loop that trains a method |
+//! | `learner.rs`, `learner/` | the loop that trains a method |
 //! | `not_finite.rs` | where a method in training has no number |
 //! | `learned.rs` | from a method or a checkpoint to surfaces and motion |
 //! | `folder.rs`, `lock.rs`, `checkpoint.rs` | the folder of a run, for one process, and whole checkpoints or none |
