@@ -348,3 +348,6 @@ fn write_through(path: &Path, content: &[u8]) -> io::Result<()> {
     let file = path.file_name().unwrap_or_default().to_string_lossy();
     write().map_err(|error: io::Error| io::Error::new(error.kind(), format!("{file}: {error}")))
 }
+
+#[cfg(test)]
+mod tests;
