@@ -291,8 +291,11 @@ mod tests {
         let coordinates = coordinates(2);
         let half = coordinates.at(0.5).to_file.expect("laid");
         assert!((half.scale - 1000f64.sqrt()).abs() < 1e-9);
-        let (sine, cosine) = 60f64.to_radians().sin_cos();
-        assert!(off(half.rotation[0], [cosine, -sine, 0.0]) < 1e-12);
+        for (time, degrees) in [(0.25, 30.0), (0.5, 60.0), (0.9, 108.0_f64)] {
+            let turned = coordinates.at(time).to_file.expect("laid").rotation;
+            let (sine, cosine) = degrees.to_radians().sin_cos();
+            assert!(off(turned[0], [cosine, -sine, 0.0]) < 1e-12, "{time}");
+        }
         let centre = coordinates.normalisation.centre;
         let end = laid()[1].apply(centre);
         let middle = [0, 1, 2].map(|k| (centre[k] + end[k]) / 2.0);
@@ -345,5 +348,47 @@ mod tests {
         let goal = laid()[1].apply(vertex);
         let found = place.displaced(vertex, [start, start], &moved);
         assert!(off(found, goal) < 1e-6, "{found:?} {goal:?}");
+    }
+
+    #[test]
+    fn lengths_take_both_scales_and_directions_the_turn_alone() {
+        let (laid, given) = (coordinates(2), coordinates(2).normalisation);
+        let (place, as_it_is) = (laid.at(1.0), Coordinates::as_given(given).at(1.0));
+        assert!(!laid.placements.is_empty() && Placements::default().is_empty());
+        // Half by the normalisation, a thousand times by the file.
+        assert!((place.invert_length(0.3) - 150.0).abs() < 1e-9);
+        assert!((as_it_is.invert_length(0.3) - 0.15).abs() < 1e-12);
+        let (sine, cosine) = 120f32.to_radians().sin_cos();
+        let turned = [[cosine, sine, 0.0], [0.0, 0.0, 1.0]];
+        let normals = [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
+        let found = place.invert_normals(normals.to_vec());
+        assert_eq!(found.len(), 2);
+        for (a, b) in found.iter().zip(turned) {
+            assert!(
+                off(a.map(f64::from), b.map(f64::from)) < 1e-6,
+                "{a:?} {b:?}"
+            );
+        }
+        assert_eq!(as_it_is.invert_normals(normals.to_vec()), normals);
+    }
+
+    #[test]
+    fn what_moves_is_displaced_by_as_much_in_the_files_unit_and_direction() {
+        let (vertex, start) = ([5.0, 0.1, -0.7], [0.125f32, 0.25, 0.5]);
+        let end = [0.375, 0.25, 0.5];
+        let both = coordinates(2);
+        let still = Coordinates::as_given(both.normalisation).at(0.0);
+        let found = still.displaced(vertex, [start, end], &still);
+        // A quarter, halved by the normalisation.
+        assert!(off(found, [5.125, 0.1, -0.7]) < 1e-12, "{found:?}");
+        let place = both.at(1.0);
+        let found = place.displaced(vertex, [start, end], &place);
+        let (sine, cosine) = 120f64.to_radians().sin_cos();
+        let goal = add(vertex, [125.0 * cosine, 125.0 * sine, 0.0]);
+        assert!(off(found, goal) < 1e-9, "{found:?} {goal:?}");
+        // From one file to the other.
+        let found = both.at(0.0).displaced(vertex, [start, end], &place);
+        let goal = laid()[1].apply([5.125, 0.1, -0.7]);
+        assert!(off(found, goal) < 1e-9, "{found:?} {goal:?}");
     }
 }
