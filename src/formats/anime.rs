@@ -226,20 +226,28 @@ pub(super) mod tests {
         let whole = two_frames();
         assert!(message(&whole[..whole.len() - 1]).contains("2 frames of 4 vertices"));
         assert!(message(&whole[..7]).contains("7 bytes, at least 12"));
+        assert!(message(&whole[..HEADER]).contains("12 bytes, but 2 frames"));
         let mut huge = whole.clone();
         huge[4..8].copy_from_slice(&i32::MAX.to_le_bytes());
         huge[0..4].copy_from_slice(&i32::MAX.to_le_bytes());
         assert!(message(&huge).contains("2147483647 frames of 2147483647 vertices"));
-        let mut negative = whole;
-        negative[8..12].copy_from_slice(&(-4i32).to_le_bytes());
-        assert!(message(&negative).contains("claims -4 triangles"));
+        for (at, claimed, name) in [(8, -4, "triangles"), (4, 0, "vertices"), (0, 0, "frames")] {
+            let mut wrong = whole.clone();
+            wrong[at..at + 4].copy_from_slice(&i32::to_le_bytes(claimed));
+            let expected = format!("claims {claimed} {name}: must be 1 or more");
+            assert!(message(&wrong).contains(&expected), "{expected}");
+        }
     }
 
     #[test]
     fn a_bad_index_and_a_bad_coordinate_are_named() {
-        let mut bytes = two_frames();
-        bytes[HEADER + 4 * 12..][..4].copy_from_slice(&(-1i32).to_le_bytes());
-        assert!(message(&bytes).contains("face 0 refers to vertex -1"));
+        // The tetrahedron has the vertices 0 to 3.
+        for index in [-1, 4] {
+            let mut bytes = two_frames();
+            bytes[HEADER + 4 * 12..][..4].copy_from_slice(&i32::to_le_bytes(index));
+            let expected = format!("face 0 refers to vertex {index}");
+            assert!(message(&bytes).contains(&expected), "{index}");
+        }
         let mut bytes = two_frames();
         let last = bytes.len() - 4;
         bytes[last..].copy_from_slice(&f32::NAN.to_le_bytes());
