@@ -13,6 +13,8 @@
 //! Vertices count from 0, in the order of their files. They count from 1 if a comment says `# counted from 1`, or if
 //! none is 0 and one is the number of the vertices; then a note says so.
 
+mod counting;
+
 use std::path::Path;
 
 use super::correspond::Correspondences;
@@ -247,7 +249,7 @@ impl Rows {
                 path: path.to_owned(),
             });
         }
-        let (first, notes) = self.first_vertex(path, counts);
+        let (first, notes) = self.first_vertex(path, counts, shapes);
         let mut found = Correspondences {
             notes,
             ..Correspondences::default()
@@ -295,7 +297,12 @@ impl Rows {
     }
 
     /// What the first vertex counts as, 0 or 1, and what was decided about it.
-    fn first_vertex(&self, path: &Path, counts: [u64; 2]) -> (u64, Vec<String>) {
+    fn first_vertex(
+        &self,
+        path: &Path,
+        counts: [u64; 2],
+        shapes: [&Shape; 2],
+    ) -> (u64, Vec<String>) {
         let name = path.display();
         let has = |is: fn(u64, u64) -> bool| {
             let from = usize::from(self.is_map);
@@ -321,6 +328,14 @@ impl Rows {
         if has_last && !has_zero {
             notes.push(format!(
                 "{name}: no vertex is 0 and one is the number of vertices: taken as counted from 1"
+            ));
+            return (1, notes);
+        }
+        let pairs = || self.rows.iter().map(|row| row.pair).collect::<Vec<_>>();
+        if !self.is_map && !has_zero && counting::is_from_one(&pairs(), shapes) {
+            notes.push(format!(
+                "{name}: no vertex is 0, and near vertices stay near if they count from 1: taken as counted from 1; if they \
+                 count from 0, write \"# counted from 0\" into the file"
             ));
             return (1, notes);
         }

@@ -269,3 +269,55 @@ proptest! {
         }
     }
 }
+
+/// Places of which none is near the next one in the order of the list.
+fn scattered() -> Vec<[f64; 3]> {
+    // Not a lattice, in which a step in the list is the same step in space everywhere.
+    let part = |k: usize, by: f64| ((k as f64 * by).sin() * 43_758.5).fract().abs();
+    (0..300)
+        .map(|k| [part(k, 12.9898), part(k, 78.233), part(k, 37.719)])
+        .collect()
+}
+
+#[test]
+fn a_part_of_the_vertices_counted_from_one_is_found_out_by_what_is_near_what() {
+    // The target lists the places backwards, moved and a little bent.
+    let places = scattered();
+    let bent = |[x, y, z]: &[f64; 3]| [x + 2.0, y + 0.1 * x * x, *z];
+    let shape = |name: &str, places: Vec<[f64; 3]>| {
+        Shape::at(Path::new(name), Mesh::new(places, Vec::new()))
+    };
+    let [a, b] = [
+        shape("a.ply", places.clone()),
+        shape("b.ply", places.iter().rev().map(bent).collect()),
+    ];
+    let read = |first: usize, more: &str| {
+        let rows = (20..120).map(|k| format!("{},{}\n", k + first, 299 - k + first));
+        let text = format!("{more}{}", rows.collect::<String>());
+        let read = |path: &Path| Correspondences::read(path, &a, &b);
+        written("pairs.csv", text.as_bytes(), read).expect("read")
+    };
+    let found = read(1, "");
+    assert_eq!((found.pairs[0], found.pairs.len()), ([20, 279], 100));
+    assert!(
+        found.notes[0].contains("taken as counted from 1"),
+        "{:?}",
+        found.notes
+    );
+    for (first, more) in [
+        (0, ""),
+        (0, "# counted from 0\n"),
+        (1, "# counted from 1\n"),
+    ] {
+        let found = read(first, more);
+        assert_eq!(found.pairs[0], [20, 279]);
+        assert!(found.notes.is_empty(), "{:?}", found.notes);
+    }
+    // Wrong either way: nothing is decided.
+    assert_eq!(read(3, "").pairs[0], [23, 282]);
+    // One vertex again and again: nothing to compare.
+    let again = "5,6\n".repeat(200);
+    let read = |path: &Path| Correspondences::read(path, &a, &b);
+    let found = written("pairs.csv", again.as_bytes(), read).expect("read");
+    assert_eq!(found.pairs[0], [5, 6]);
+}
