@@ -11,7 +11,7 @@
 //! where the others have names. Whole numbers may be written as `12.0`. A vertex may occur more than once.
 //!
 //! Vertices count from 0, in the order of their files. They count from 1 if a comment says `# counted from 1`, or if
-//! none is 0 and one is the number of the vertices; then a note says so.
+//! none is 0 and one is the number of the vertices, or near vertices stay near that way alone; then a note says so.
 
 mod counting;
 
