@@ -49,26 +49,12 @@ pub(super) fn place(
 
 #[cfg(test)]
 mod tests {
-    use std::num::NonZeroUsize;
-
-    use isomorph_training::data::Surroundings;
+    use isomorph_training::data::TrainingData;
     use isomorph_training::deformation::SurfaceField;
 
     use super::*;
     use crate::shape::Normalisation;
     use crate::surface::learned::Learned;
-
-    struct Nothing;
-
-    impl Surroundings for Nothing {
-        fn signed_distance(&self, _: [f32; 3]) -> Option<f32> {
-            None
-        }
-
-        fn nearest(&self, _: usize, _: NonZeroUsize) -> Vec<usize> {
-            Vec::new()
-        }
-    }
 
     /// No number from this x on.
     struct Until(f32);
@@ -86,12 +72,10 @@ mod tests {
 
     #[test]
     fn the_first_point_without_a_number_is_said_in_the_users_coordinates() {
-        let keys = [0.0, 1.0].map(|time| KeyPoints {
-            time,
-            points: (0..4).map(|k| [k as f32 + time, 0.0, 0.0]).collect(),
-            normals: None,
-            around: Box::new(Nothing),
-        });
+        let mut keys = TrainingData::spheres(4, 0).keys;
+        for key in &mut keys {
+            key.points = (0..4).map(|k| [k as f32 + key.time, 0.0, 0.0]).collect();
+        }
         let coordinates = Coordinates::as_given(Normalisation {
             centre: [10.0, 0.0, 0.0],
             scale: 2.0,

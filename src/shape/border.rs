@@ -79,21 +79,33 @@ const BEYOND: f64 = 3.0;
 /// Less than this share of a shape that has no counterpart is within what a border's place is off.
 pub(crate) const LEAST_MISSING: f64 = 0.02;
 
-/// Which places lie more than so many spacings beyond the border of points.
-pub(super) fn beyond(
-    points: &[[f32; 3]],
-    border: &[bool],
-    places: &[[f32; 3]],
-    spacings: f64,
-) -> Vec<bool> {
-    let wide = |x: &[f32; 3]| x.map(f64::from);
-    let points: Vec<[f64; 3]> = points.iter().map(wide).collect();
-    let (search, spacing) = (NeighbourSearch::new(&points), usual_spacing(&points));
-    let is_beyond = |x: &[f32; 3]| {
-        let near = search.nearest_one(wide(x));
-        border[near.index as usize] && near.squared_distance.sqrt() > spacings * spacing
-    };
-    places.par_iter().map(is_beyond).collect()
+/// The border of points, arranged for queries.
+pub(super) struct BorderSearch<'a> {
+    search: NeighbourSearch,
+    spacing: f64,
+    border: &'a [bool],
+}
+
+impl<'a> BorderSearch<'a> {
+    /// Of points, each with whether it lies at the border.
+    pub(super) fn new(points: &[[f32; 3]], border: &'a [bool]) -> Self {
+        let points: Vec<[f64; 3]> = points.iter().map(|x| x.map(f64::from)).collect();
+        Self {
+            search: NeighbourSearch::new(&points),
+            spacing: usual_spacing(&points),
+            border,
+        }
+    }
+
+    /// Which places lie more than so many spacings beyond the border.
+    pub(super) fn beyond(&self, places: &[[f32; 3]], spacings: f64) -> Vec<bool> {
+        let is_beyond = |x: &[f32; 3]| {
+            let near = self.search.nearest_one(x.map(f64::from));
+            self.border[near.index as usize]
+                && near.squared_distance.sqrt() > spacings * self.spacing
+        };
+        places.par_iter().map(is_beyond).collect()
+    }
 }
 
 /// The share of places that lie beyond the border of points; 0 without a border.
@@ -101,7 +113,7 @@ pub(crate) fn share_beyond(points: &[[f32; 3]], border: &[bool], places: &[[f32;
     if border.is_empty() || places.is_empty() {
         return 0.0;
     }
-    let beyond = beyond(points, border, places, BEYOND);
+    let beyond = BorderSearch::new(points, border).beyond(places, BEYOND);
     let count = beyond.iter().filter(|is| **is).count();
     count as f64 / places.len() as f64
 }

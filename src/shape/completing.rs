@@ -3,7 +3,7 @@
 
 use rand_distr::{Distribution, UnitSphere};
 
-use super::border::beyond;
+use super::border::BorderSearch;
 use super::keyframes::{Draw, Keyframe, PointCloud};
 use super::sample::sample_surface;
 use super::solid::Solid;
@@ -34,11 +34,12 @@ pub(crate) fn complete(
         return None;
     }
     let given = &key.cloud;
+    let border = BorderSearch::new(&given.points, &key.border);
     let mut rng = Draw::Completing(k).generator(seed);
     let mut more = |count: usize| -> Vec<[f32; 3]> {
         let drawn = sample_surface(&surface, count, &mut rng).points;
         let drawn: Vec<[f32; 3]> = drawn.iter().map(|x| x.map(|part| part as f32)).collect();
-        let are_beyond = beyond(&given.points, &key.border, &drawn, APART);
+        let are_beyond = border.beyond(&drawn, APART);
         let drawn = drawn.into_iter().zip(are_beyond);
         drawn.filter_map(|(x, is)| is.then_some(x)).collect()
     };

@@ -178,8 +178,8 @@ pub(super) fn of_sheet(shape: &Shape, thickness: Option<f64>) -> String {
     let name = shape.path.display();
     match thickness {
         Some(thickness) => format!(
-            "{name}: an open sheet has no inside: its surfaces are {thickness:.3} thick (spline.sheet-thickness of the preset instant); the \
-             carried mesh (--carry) is the sheet itself"
+            "{name}: an open sheet has no inside: its surfaces are {thickness:.3} thick (spline.sheet-thickness of the \
+             preset instant); the carried mesh (--carry) is the sheet itself"
         ),
         None => format!(
             "{name}: an open sheet has no inside: its surfaces are closed behind it by a cushion, which may reach the box; \

@@ -12,9 +12,6 @@ use crate::data::{Bounds, KeyPoints};
 /// Cells of the grid along each side of the box.
 const CELLS: usize = 24;
 
-/// A place in the grid, by its number along each axis.
-type Cell = [usize; 3];
-
 /// The hollows of one key frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Hollows {
@@ -121,7 +118,8 @@ fn beside(number: usize, axis: usize) -> [Option<usize>; 2] {
     ]
 }
 
-fn cell(number: usize) -> Cell {
+/// The numbers of a cell along the axes.
+fn cell(number: usize) -> [usize; 3] {
     [
         number / (CELLS * CELLS),
         number / CELLS % CELLS,

@@ -310,7 +310,7 @@ impl EndBatch {
         } else {
             &[]
         };
-        for (key, number) in data.keys.iter().zip(0..) {
+        for (number, key) in data.keys.iter().enumerate() {
             pick(key, count, &mut surface, of_surface);
             let hollow = hollows.get(number).filter(|hollow| !hollow.is_empty());
             let filled = band + ((count - band) as f64 * IN_HOLLOWS).round() as usize;

@@ -47,6 +47,11 @@ impl Settings {
             training,
         }
     }
+
+    /// Whether signed distances take part in a step.
+    pub fn measures_distances(&self) -> bool {
+        self.loss.distance > 0.0
+    }
 }
 
 /// The weights of the terms at the ends.

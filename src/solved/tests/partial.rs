@@ -8,6 +8,20 @@ use crate::shape::{CorrespondenceSource, Correspondences, DataOptions, NormalSou
 /// Up to which height the target is seen: a third of it is missing.
 const SEEN: f64 = 0.1;
 
+/// Two shapes with these pairs, points of each mesh, and thickness of sheets.
+fn options(pairs: CorrespondenceSource, points: usize, sheets: Option<f64>) -> DataOptions {
+    DataOptions {
+        times: vec![0.0, 1.0],
+        between: vec![pairs],
+        points,
+        correspondence_fraction: 0.1,
+        normals: NormalSource::Auto,
+        mirrored: false,
+        sheets,
+        seed: 0,
+    }
+}
+
 /// A bumpy ball, the same 0.2 further, and both as key frames, the second without what is higher than it is seen.
 fn half_seen() -> ([Mesh<f64>; 2], Keyframes) {
     let ball = bumpy_sphere(60);
@@ -22,19 +36,11 @@ fn half_seen() -> ([Mesh<f64>; 2], Keyframes) {
         normals: Some(seen.iter().map(|k| normals[*k]).collect()),
     });
     let pairs = seen.iter().zip(0..).map(|(k, at)| [*k as u32, at]);
-    let options = DataOptions {
-        times: vec![0.0, 1.0],
-        between: vec![CorrespondenceSource::Pairs(Correspondences {
-            pairs: pairs.collect(),
-            ..Correspondences::none()
-        })],
-        points: 6000,
-        correspondence_fraction: 0.1,
-        normals: NormalSource::Auto,
-        mirrored: false,
-        sheets: None,
-        seed: 0,
-    };
+    let pairs = CorrespondenceSource::Pairs(Correspondences {
+        pairs: pairs.collect(),
+        ..Correspondences::none()
+    });
+    let options = options(pairs, 6000, None);
     let keyframes = prepare(&[Shape::of(ball.clone()), target], &options).expect("shapes");
     assert!(keyframes.keys[1].border.contains(&true));
     ([ball, moved], keyframes)
@@ -141,16 +147,7 @@ fn networks_learn_a_sheet_with_its_thickness_on_both_sides_and_around_its_rim() 
     let mut network = Recipe::between("a.ply", "b.ply").expect("two files");
     network.with("preset=quick").expect("a recipe");
     let thickness = sheet_thickness(&network).expect("as instant has it");
-    let options = DataOptions {
-        times: vec![0.0, 1.0],
-        between: vec![CorrespondenceSource::SameVertices],
-        points: 8000,
-        correspondence_fraction: 0.1,
-        normals: NormalSource::Auto,
-        mirrored: false,
-        sheets: Some(thickness),
-        seed: 0,
-    };
+    let options = options(CorrespondenceSource::SameVertices, 8000, Some(thickness));
     let keyframes = prepare(&[Shape::of(flat), Shape::of(bent)], &options).expect("shapes");
     let completed = guide(&network, &keyframes).expect("a field").completed;
     let half = thickness as f32 / 2.0;

@@ -214,7 +214,7 @@ impl<B: TrainBackend> Method<B> for EndsAndCouplings<B> {
             _ => BatchSizes::new(training, data).matched,
         };
         Drawn {
-            ends: EndBatch::draw(data, training, step, self.settings.loss.distance > 0.0),
+            ends: EndBatch::draw(data, training, step, self.settings.measures_distances()),
             batch: Batch {
                 matched: Matched::draw(data, training.seed, step, count),
                 ..Batch::default()
@@ -226,7 +226,7 @@ impl<B: TrainBackend> Method<B> for EndsAndCouplings<B> {
     fn objective(&self, data: &TrainingData, drawn: &Drawn, step: usize) -> Posed<B> {
         let derivatives = &self.settings.derivatives;
         if self.phase(step) == Phase::Ends {
-            let measured = self.settings.loss.distance > 0.0;
+            let measured = self.settings.measures_distances();
             let [source, target] = OnDevice::new(data, &drawn.ends, measured, &self.device).apart();
             let weights = end_weights(&self.settings.loss);
             let ends = self.ends.replica();

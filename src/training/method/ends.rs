@@ -185,7 +185,7 @@ impl<B: TrainBackend, M: EndNet<B>> EndFit<B, M> {
 
     /// Whether signed distances take part in a step.
     fn measured(&self) -> bool {
-        M::DISTANCES || self.settings.loss.distance > 0.0
+        M::DISTANCES || self.settings.measures_distances()
     }
 }
 

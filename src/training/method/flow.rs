@@ -133,7 +133,7 @@ impl<B: TrainBackend> Method<B> for EndsAndFlow<B> {
             ends: 0,
             ..BatchSizes::new(training, data)
         };
-        let measured = self.settings.loss.distance > 0.0;
+        let measured = self.settings.measures_distances();
         let ends = EndBatch::draw(data, training, step, measured);
         if self.phase(step) == Phase::Guided {
             return Drawn {
@@ -151,7 +151,7 @@ impl<B: TrainBackend> Method<B> for EndsAndFlow<B> {
 
     fn objective(&self, data: &TrainingData, drawn: &Drawn, step: usize) -> Posed<B> {
         let (settings, device) = (&self.settings, &self.device);
-        let measured = settings.loss.distance > 0.0;
+        let measured = settings.measures_distances();
         let [source, target] = OnDevice::new(data, &drawn.ends, measured, device).apart();
         let (ends, v) = (self.ends.replica(), self.velocity.replica());
         let last_scale = settings.loss.matching_scale;
