@@ -33,6 +33,7 @@ import tempfile
 import time
 import zlib
 from collections import Counter
+from itertools import zip_longest
 from math import cos, pi, sin
 from pathlib import Path
 
@@ -381,7 +382,15 @@ def check_end(work: Workplace, name: str) -> None:
         raise Lost(f"{name}: ends with {sorted(found)}, and not with {sorted(wanted)}")
     for file, content in wanted.items():
         if found[file] != content:
-            raise Lost(f"{name}: {file} is not that of the undisturbed run")
+            raise Lost(f"{name}: {file} is not that of the undisturbed run{first_difference(content, found[file])}")
+
+
+def first_difference(wanted: bytes, found: bytes) -> str:
+    """The first line of a text that is another, in words for the end of a sentence."""
+    for number, (one, other) in enumerate(zip_longest(wanted.splitlines(), found.splitlines()), 1):
+        if one != other:
+            return f"; line {number} is {(other or b'')[:200]!r}, and was {(one or b'')[:200]!r}"
+    return ""
 
 
 def run_files(run: Path) -> dict:
@@ -402,10 +411,27 @@ def all_files(folder: Path) -> dict:
             if path.suffix in (".json", ".jsonl", ".md", ".svg"):
                 text = SECONDS.sub("", content.decode())
                 # Tables have seconds in them; figures dates.
-                text = re.sub(r"\b\d+(\.\d+)? ?s\b", "", text)
+                text = re.sub(r"\b\d+(\.\d+)? ?s\b", "", without_times(text))
                 content = text.replace("-again", "").replace("-whole", "").encode()
             found[str(path.relative_to(folder))] = content
     return found
+
+
+def without_times(text: str) -> str:
+    """A text whose Markdown tables have no column of seconds or dates, and no padding, which depends on them."""
+    lines, kept = [], None
+    for line in text.splitlines(keepends=True):
+        if not line.startswith("|"):
+            lines.append(line)
+            kept = None
+            continue
+        cells = [cell.strip() for cell in line.strip().strip("|").split("|")]
+        if kept is None:
+            kept = [at for at, cell in enumerate(cells) if not re.search(r"\(s\)|^dates$", cell)]
+        # The line under the heading is as long as the widest cell.
+        cells = ["-" if re.fullmatch(r":?-+:?", cell) else cell for cell in cells]
+        lines.append("|".join(cells[at] for at in kept if at < len(cells)) + "\n")
+    return "".join(lines)
 
 
 def sphere(shift: float) -> tuple[list, list]:

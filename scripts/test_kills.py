@@ -78,6 +78,18 @@ class Kills(unittest.TestCase):
             with self.assertRaises(kills.Lost):
                 kills.check_told("train", "write", "error=ENOSPC", status, told)
 
+    def test_seconds_in_a_table_are_no_difference_and_numbers_are(self):
+        one = "| method | CD ↓ | training (s) ↓ |\n| ------ | ---: | -------------: |\n| quick | 1.2 | **0** |\n\nText.\n"
+        other = one.replace("**0**", "12").replace("------", "--------")
+        work = SimpleNamespace(place=self.place, wanted_results={})
+        self.write("whole/table.md", one.encode())
+        work.wanted_results = kills.all_files(self.place / "whole")
+        self.write("results-again/table.md", other.encode())
+        kills.check_end(work, "compare")
+        self.write("results-again/table.md", other.replace("1.2", "1.3").encode())
+        with self.assertRaisesRegex(kills.Lost, "1.3.*1.2"):
+            kills.check_end(work, "compare")
+
     def test_other_files_than_the_undisturbed_ones_are_a_loss(self):
         self.write("out/surface.ply", b"one")
         work = SimpleNamespace(place=self.place, wanted_out={"surface.ply": b"one"})
