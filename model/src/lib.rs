@@ -50,8 +50,8 @@ pub mod operators;
 pub use autodiff::{ModelBackend, TrainBackend, product, without_denormals};
 pub use flow::{Carried, FlowGeometry, Geometry, Motion, trajectory};
 pub use nets::{
-    ImplicitNet, ImplicitNetConfig, Mlp, MlpConfig, SplineGrid, SplineVelocity, VelocityNet,
-    VelocityNetConfig,
+    ImplicitNet, ImplicitNetConfig, IntervalVelocity, Mlp, MlpConfig, SequenceVelocity,
+    SequenceVelocityConfig, SplineGrid, SplineVelocity, VelocityNet, VelocityNetConfig,
 };
 pub use objective::{Objective, Term};
 

@@ -51,10 +51,10 @@ pub(super) fn run(args: InitArgs) -> Result {
         let allowed = Preset::WORDS.join(", ");
         Failure::Usage(format!("--preset {word}: must be one of {allowed}"))
     })?;
-    if !is_pair && preset != Preset::Instant {
+    if !is_pair && preset == Preset::Paper {
         let count = files.len();
         return Err(Failure::Usage(format!(
-            "--preset {word}: its networks take two shapes, not {count}; give --preset instant"
+            "--preset {word}: it takes two shapes, not {count}; give --preset instant, quick or default"
         )));
     }
     let correspondences = match args.correspondences.as_str() {
@@ -63,13 +63,7 @@ pub(super) fn run(args: InitArgs) -> Result {
         "match" => Correspondences::Match,
         file => {
             let file = PathBuf::from(file);
-            let [source, target] = &shapes[..] else {
-                let text = "takes two shapes; give each key frame a file of its own in the recipe";
-                return Err(Failure::Usage(format!(
-                    "--correspondences {file:?}: {text}"
-                )));
-            };
-            known_pairs(&file, source, target)?;
+            known_pairs(&file, &shapes)?;
             Correspondences::File(file)
         }
     };

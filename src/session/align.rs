@@ -59,9 +59,9 @@ pub(super) fn aligned<'a>(recipe: &Recipe, shapes: &'a [Shape]) -> Result<Aligne
         return Ok(aligned);
     }
     let mut to_common = vec![Similarity::IDENTITY];
-    for (two, known) in shapes.windows(2).zip(&recipe.data.between) {
+    for (k, two) in shapes.windows(2).enumerate() {
         let (source, target) = (&two[0], &two[1]);
-        let pairs = places(known, source, target)?;
+        let pairs = places(recipe, k, source, target)?;
         let onto = onto(source, target, &pairs, recipe)?;
         let is_said = recipe.data.align != Align::Auto || onto != Similarity::IDENTITY;
         if is_said {
@@ -104,14 +104,18 @@ fn said([source, target]: [&Shape; 2], onto: &Similarity, recipe: &Recipe) -> St
     )
 }
 
-/// Corresponding places of two files that are known before any search.
+/// Corresponding places of two files, of key frame `k` and the next, that are known before any search.
 fn places(
-    known: &recipe::Correspondences,
+    recipe: &Recipe,
+    k: usize,
     source: &Shape,
     target: &Shape,
 ) -> Result<Vec<([f64; 3], [f64; 3])>> {
-    let known = match known {
-        recipe::Correspondences::File(path) => Correspondences::read(path, source, target)?,
+    let between = &recipe.data.between;
+    let known = match &between[k] {
+        recipe::Correspondences::File(path) => {
+            Correspondences::read_between(path, k, between.len() + 1, [source, target])?
+        }
         recipe::Correspondences::SameVertices => Correspondences::same_vertices(source, target)?,
         recipe::Correspondences::Match | recipe::Correspondences::None => Correspondences::none(),
     };

@@ -95,6 +95,14 @@ fn networks(
     checkpoint: &Checkpoint,
     backend: Backend,
 ) -> Result<Arrays> {
+    let keys = recipe.data.keyframes.len();
+    if keys > 2 {
+        return Err(Error::usage(format!(
+            "{}: networks are exported where they are trained on two key frames, and these have {keys}; take the preset \
+             \"instant\", whose splines are exported through any number",
+            run.display()
+        )));
+    }
     let trainer = restored(checkpoint, recipe, &*backend.open()?)?;
     let weights = trainer.weights().ok_or_else(|| {
         Error::usage(format!(

@@ -43,8 +43,8 @@ fn spheres() -> Keyframes {
     let keys = data.keys.iter().map(|key| Keyframe {
         time: f64::from(key.time),
         cloud: PointCloud {
-            points: key.points.clone(),
-            normals: key.normals.clone(),
+            points: key.points.to_vec(),
+            normals: key.normals.as_deref().map(<[_]>::to_vec),
         },
         mesh: None,
         border: Vec::new(),

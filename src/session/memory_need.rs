@@ -125,8 +125,12 @@ fn of_networks(recipe: &Recipe) -> u64 {
     let (f, v) = (&recipe.implicit, &recipe.velocity);
     let weights = |depth: usize, width: usize| depth as u64 * (width as u64).pow(2);
     let is_one = f.geometry == GeometryKind::Network;
-    let fields = if is_one { 1 } else { 2 };
-    let weights = fields * weights(f.depth, f.width) + weights(v.depth, v.width);
+    // One for each key frame, and as many columns of V's last layer.
+    let keys = recipe.data.keyframes.len() as u64;
+    let fields = if is_one { 1 } else { keys };
+    let last = if keys > 2 { 3 * (keys + 1) } else { 0 };
+    let weights =
+        fields * weights(f.depth, f.width) + weights(v.depth, v.width) + last * v.width as u64;
     let layers = LAYERS[usize::from(is_one)];
     let sample = layers * size_of::<f32>() as u64 * (f.width + v.width) as u64;
     let samples = recipe.training.batch + recipe.training.correspondence_batch;

@@ -1,5 +1,6 @@
 //! Corresponding vertices of two shapes, found from the shapes alone, and a picture of how far to trust them.
 
+use std::borrow::Borrow;
 use std::path::Path;
 
 use crate::atomic::write_atomically;
@@ -41,12 +42,18 @@ pub fn find_from(
     find_around(source, target, &given, options, on_event)
 }
 
-/// How many pairs a file holds for two shapes, as `data.correspondences` reads it.
+/// How many pairs a file holds from each of two shapes or more to the next, in all, as `data.correspondences` reads it.
 ///
 /// # Errors
 /// What is wrong with the file.
-pub fn known_pairs(path: &Path, source: &Shape, target: &Shape) -> Result<usize> {
-    Ok(Correspondences::read(path, source, target)?.pairs.len())
+pub fn known_pairs(path: &Path, shapes: &[impl Borrow<Shape>]) -> Result<usize> {
+    let between = shapes.windows(2).enumerate().map(|(k, two)| {
+        let two = [two[0].borrow(), two[1].borrow()];
+        Ok(Correspondences::read_between(path, k, shapes.len(), two)?
+            .pairs
+            .len())
+    });
+    between.sum()
 }
 
 fn find_around(

@@ -173,7 +173,7 @@ pub(super) fn points_only(recipe: &Recipe, coordinates: &Coordinates) -> Result<
 fn options(recipe: &Recipe, between: Vec<CorrespondenceSource>) -> DataOptions {
     let section = &recipe.data;
     DataOptions {
-        times: times(recipe),
+        times: section.unit_times(),
         between,
         points: section.points,
         correspondence_fraction: section.correspondence_fraction,
@@ -187,16 +187,6 @@ fn options(recipe: &Recipe, between: Vec<CorrespondenceSource>) -> DataOptions {
         sheets: sheet_thickness(recipe),
         seed: recipe.training.seed,
     }
-}
-
-/// The times of the key frames, brought to 0 to 1.
-fn times(recipe: &Recipe) -> Vec<f64> {
-    let times: Vec<f64> = recipe.data.keyframes.iter().map(|key| key.time).collect();
-    let (first, last) = (times[0], times[times.len() - 1]);
-    times
-        .iter()
-        .map(|time| (time - first) / (last - first))
-        .collect()
 }
 
 impl Keyframes {

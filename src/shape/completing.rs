@@ -19,7 +19,7 @@ const APART: f64 = 1.0;
 /// Steps back onto the surface of a sheet: one is exact but for rounding, and where a far part of it is nearer.
 const BACK: usize = 2;
 
-/// The points of key frame `k` of two and, of a surface that is whole, those beyond their border, as dense; with
+/// The points of key frame `k` and, of a surface that is whole, those beyond their border, as dense; with
 /// normals, which `normals` gives at points. `None` if the surface has no area.
 pub(crate) fn complete(
     key: &Keyframe,

@@ -24,7 +24,7 @@ use crate::geometry::{Bounds, Mesh, turned_outwards};
 /// Where correspondences come from.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum CorrespondenceSource {
-    /// A file of pairs, or of a map.
+    /// A file of pairs, of a map, or of points in all key frames.
     File(PathBuf),
     /// Vertex i of the source corresponds to vertex i of the target.
     SameVertices,
@@ -152,7 +152,7 @@ impl Keyframes {
 pub(super) enum Draw {
     /// Of the key frame with this number.
     Points(usize),
-    /// Of what completes one of two shapes.
+    /// Of what completes the key frame with this number.
     Completing(usize),
     /// From the key frame with this number to the next.
     Correspondences(usize),
@@ -167,10 +167,11 @@ impl Draw {
         rng.set_stream(match self {
             Self::Points(key @ 0..=1) => key as u64,
             Self::Correspondences(0) => 2,
-            Self::Completing(key) => 3 + key as u64,
+            Self::Completing(key @ 0..=1) => 3 + key as u64,
             // Far above the streams of training.
             Self::Points(key) => u64::MAX - STREAMS + key as u64,
             Self::Correspondences(key) => u64::MAX - 2 * STREAMS + key as u64,
+            Self::Completing(key) => u64::MAX - 3 * STREAMS + key as u64,
         });
         rng
     }
@@ -217,13 +218,16 @@ pub(crate) fn prepare(shapes: &[Shape], options: &DataOptions) -> Result<Keyfram
         notes.extend(mismatch::distance(two));
     }
     for (k, source) in options.between.iter().enumerate() {
-        // Vertices of equal number are the same points throughout a sequence: a draw for all intervals.
-        let same = *source == CorrespondenceSource::SameVertices;
+        // Vertices of equal number, and lines of one file, are the same points throughout a sequence: a draw for all
+        // intervals.
+        let is_file = matches!(source, CorrespondenceSource::File(_));
+        let is_shared = is_file && options.between.iter().all(|other| other == source);
+        let same = *source == CorrespondenceSource::SameVertices || is_shared;
         let draw = Draw::Correspondences(if same { 0 } else { k });
         let rng = draw.generator(options.seed);
         let known = correspondences(
             options,
-            source,
+            (k, source),
             [shapes[k].as_ref(), shapes[k + 1].as_ref()],
             (k > 0).then(|| shapes[0].as_ref()),
             rng,
@@ -355,10 +359,10 @@ struct PointPairs {
     confidence: Vec<f32>,
 }
 
-/// The correspondences of two shapes that the options ask for.
+/// The correspondences of two shapes, key frame `k` and the next, that the options ask for.
 fn correspondences(
     options: &DataOptions,
-    from: &CorrespondenceSource,
+    (k, from): (usize, &CorrespondenceSource),
     [source, target]: [&Shape; 2],
     first: Option<&Shape>,
     mut rng: ChaCha8Rng,
@@ -366,7 +370,9 @@ fn correspondences(
 ) -> Result<PointPairs, ShapeError> {
     let available = match from {
         CorrespondenceSource::None => return Ok(PointPairs::default()),
-        CorrespondenceSource::File(path) => Correspondences::read(path, source, target)?,
+        CorrespondenceSource::File(path) => {
+            Correspondences::read_between(path, k, options.times.len(), [source, target])?
+        }
         CorrespondenceSource::SameVertices => Correspondences::same_vertices(source, target)?,
         CorrespondenceSource::Pairs(known) => known.clone(),
     };

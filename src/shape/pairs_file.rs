@@ -5,6 +5,7 @@
 //! | 1 | a point-to-point map: for each vertex of the source, in order, the target's vertex, or -1 for none |
 //! | 2 | the source's vertex and the target's |
 //! | 3 | the same and a confidence from 0 to 1, which `isomorph match` writes; it may be missing on some lines |
+//! | one for each of many key frames | a point on each line: its vertex in each key frame, or -1 where it is not known |
 //!
 //! Numbers in text are separated by commas, semicolons, spaces or tabs. Empty lines, lines that start with `#` and one
 //! line of column names before the first are passed over. A column before the others without a name is passed over too,
@@ -14,6 +15,7 @@
 //! none is 0 and one is the number of the vertices, or near vertices stay near that way alone; then a note says so.
 
 mod counting;
+mod tracks;
 
 use std::path::Path;
 
@@ -34,6 +36,15 @@ struct Row {
     at: usize,
     pair: [u64; 2],
     confidence: Option<f32>,
+}
+
+/// What the columns of a file may be.
+#[derive(Clone, Copy)]
+enum Layout {
+    /// Those of two shapes.
+    Pairs,
+    /// One for each of so many key frames, of which `k` and the next count.
+    Tracks { k: usize, key_frames: usize },
 }
 
 /// What a file holds.
@@ -57,18 +68,36 @@ impl Correspondences {
     /// The file and the line, where a line is not of whole numbers or a vertex does not exist; a map that has not one
     /// line for each vertex of the source; [`ShapeError::NoCorrespondences`] if it holds no pair at all.
     pub fn read(path: &Path, source: &Shape, target: &Shape) -> Result<Self, ShapeError> {
+        Self::read_as(path, Layout::Pairs, [source, target])
+    }
+
+    /// Reads what a file of many key frames has of key frame `k` and the next, which are the shapes. A file without a
+    /// column for each key frame is one of pairs, the same between any two.
+    ///
+    /// # Errors
+    /// Those of [`Self::read`].
+    pub(crate) fn read_between(
+        path: &Path,
+        k: usize,
+        key_frames: usize,
+        shapes: [&Shape; 2],
+    ) -> Result<Self, ShapeError> {
+        Self::read_as(path, Layout::Tracks { k, key_frames }, shapes)
+    }
+
+    fn read_as(path: &Path, layout: Layout, shapes: [&Shape; 2]) -> Result<Self, ShapeError> {
         let ending = path.extension().unwrap_or_default();
         let is_array = ["npy", "npz"]
             .iter()
             .any(|known| ending.eq_ignore_ascii_case(known));
         let found = if is_array {
-            Rows::of_arrays(path)?
+            Rows::of_arrays(path, layout)?
         } else {
             let bytes = file_bytes(path)?;
             refuse_utf_16(path, &bytes)?;
-            Rows::of_text(path, &bytes)?
+            Rows::of_text(path, &bytes, layout)?
         };
-        found.resolve(path, [source, target])
+        found.resolve(path, shapes)
     }
 
     /// The pairs in the text of such a file; `path` opens the messages.
@@ -81,7 +110,7 @@ impl Correspondences {
         source: &Shape,
         target: &Shape,
     ) -> Result<Self, ShapeError> {
-        Rows::of_text(path, text.as_bytes())?.resolve(path, [source, target])
+        Rows::of_text(path, text.as_bytes(), Layout::Pairs)?.resolve(path, [source, target])
     }
 }
 
@@ -104,8 +133,9 @@ impl Correspondences {
 }
 
 impl Rows {
-    fn of_text(path: &Path, bytes: &[u8]) -> Result<Self, ShapeError> {
+    fn of_text(path: &Path, bytes: &[u8], layout: Layout) -> Result<Self, ShapeError> {
         let mut found = Self::default();
+        let tracks = tracks::columns(layout, || tracks::rows_of_text(bytes));
         let (mut names_allowed, mut has_index) = (true, false);
         for (at, line) in lines(bytes) {
             if let Some(comment) = line.strip_prefix('#') {
@@ -129,6 +159,11 @@ impl Rows {
             let wrong = |allowed: &str| {
                 ShapeError::line(path, at, format!("{:?}: {allowed}", shown(&line)))
             };
+            if let Some(columns) = tracks {
+                let known = tracks::of_fields(&fields, columns);
+                found.push_tracked(at, known.ok_or_else(|| wrong(tracks::ALLOWED))?);
+                continue;
+            }
             if found.count == 0 {
                 found.is_map = fields.len() == 1;
             }
@@ -154,7 +189,7 @@ impl Rows {
         Ok(found)
     }
 
-    fn of_arrays(path: &Path) -> Result<Self, ShapeError> {
+    fn of_arrays(path: &Path, layout: Layout) -> Result<Self, ShapeError> {
         let mut arrays = Arrays::open(path)?;
         let only = (arrays.names.len() == 1).then_some(0);
         let Some(at) = arrays.find(&NAMES).or(only) else {
@@ -164,10 +199,22 @@ impl Rows {
             return Err(ShapeError::malformed(path, problem));
         };
         let array = arrays.read(at)?;
-        Self::of_array(&array).map_err(|problem| arrays.wrong(at, &problem))
+        Self::of_array(&array, layout).map_err(|problem| arrays.wrong(at, &problem))
     }
 
-    fn of_array(array: &Array) -> Result<Self, String> {
+    fn of_array(array: &Array, layout: Layout) -> Result<Self, String> {
+        if let Some(columns) = tracks::columns(layout, || tracks::rows_of_array(array)) {
+            let mut found = Self {
+                is_array: true,
+                ..Self::default()
+            };
+            for (at, row) in array.values.chunks_exact(columns.of).enumerate() {
+                let known = tracks::of_numbers(row, columns);
+                let wrong = || format!("row {at} is {row:?}: {}", tracks::ALLOWED);
+                found.push_tracked(at, known.ok_or_else(wrong)?);
+            }
+            return Ok(found);
+        }
         let width = match array.shape[..] {
             [_] => 1,
             [_, width @ 1..=3] => width,
@@ -216,6 +263,18 @@ impl Rows {
     fn push(&mut self, row: Row) {
         self.rows.push(row);
         self.count += 1;
+    }
+
+    /// Adds the next point of many key frames, if both of its vertices are known.
+    fn push_tracked(&mut self, at: usize, vertices: [Option<u64>; 2]) {
+        self.count += 1;
+        if let [Some(source), Some(target)] = vertices {
+            self.rows.push(Row {
+                at,
+                pair: [source, target],
+                confidence: None,
+            });
+        }
     }
 
     /// Adds the next line of a map; none if it is negative and not -1.
@@ -316,9 +375,10 @@ impl Rows {
         );
         let mut notes = Vec::new();
         let lost = self.count - self.rows.len();
+        let what = if self.is_map { "vertices" } else { "points" };
         if lost > 0 {
             notes.push(format!(
-                "{name}: {lost} of {} vertices have no partner (-1)",
+                "{name}: {lost} of {} {what} have no partner (-1)",
                 self.count
             ));
         }

@@ -1,7 +1,7 @@
 //! Key frames as methods sample them: points with what lies around them.
 
 use std::num::NonZeroUsize;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use isomorph_training::data::{KeyPoints, Surroundings, TrainingData};
 
@@ -19,12 +19,13 @@ impl Keyframes {
 
 /// The points of a cloud at a time as methods sample them.
 pub(crate) fn trained(time: f64, cloud: &PointCloud) -> KeyPoints {
-    KeyPoints {
-        time: time as f32,
-        points: cloud.points.clone(),
-        normals: cloud.normals.clone(),
-        around: Box::new(Around::new(cloud)),
-    }
+    let around = Arc::new(Around::new(cloud));
+    KeyPoints::new(
+        time as f32,
+        cloud.points.clone(),
+        cloud.normals.clone(),
+        around,
+    )
 }
 
 /// Searches around a cloud, each made on its first use: most methods need none.

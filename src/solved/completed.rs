@@ -35,38 +35,62 @@ pub(crate) fn encloses(key: &Keyframe) -> bool {
     key.border.is_empty() && key.sheet.is_none()
 }
 
-/// For each of two key frames its points and those that complete it, or `None` where it is known: by a field that is
-/// solved for already.
+/// For each key frame its points and those that complete it, or `None` where it is known: by a field that is solved for
+/// already, of which `field` gives the part from each key frame to the next.
+///
+/// A shape that is known in part is completed once, from one of its neighbours, so that its surface is the same from
+/// either side.
 ///
 /// # Errors
 /// If the surface cannot be found: the reason, as a part of a sentence.
-pub(super) fn completed(
-    field: &SplineField,
+pub(super) fn completed<const H: usize>(
+    field: impl Fn(usize) -> SplineField<f32, H>,
     recipe: &Recipe,
     keyframes: &Keyframes,
-) -> Result<[Option<PointCloud>; 2], String> {
-    let keys = &keyframes.keys;
-    if keys.iter().all(encloses) {
-        return Ok([None, None]);
+) -> Result<Vec<Option<PointCloud>>, String> {
+    let (keys, seed) = (&keyframes.keys, recipe.training.seed);
+    let mut found = vec![None; keys.len()];
+    for k in (0..keys.len()).filter(|k| !encloses(&keys[*k])) {
+        let s = neighbour(keys, k).min(k);
+        let solid = |k: usize| SolidParts::of(&keys[k]).and_then(Solid::new).map(Arc::new);
+        let (Some(first), Some(second)) = (solid(s), solid(s + 1)) else {
+            continue;
+        };
+        let shapes = [first, second];
+        found[k] = if keys[k].sheet.is_some() {
+            thicken(&keys[k], k, &shapes[k - s], seed)
+        } else {
+            let carried = CarriedShapes::new(field(s), shapes, false);
+            of_part(carried, [s, k], recipe, keyframes)?
+        };
     }
-    let solid = |k: usize| SolidParts::of(&keys[k]).and_then(Solid::new);
-    let (Some(source), Some(target)) = (solid(0), solid(1)) else {
-        return Ok([None, None]);
-    };
-    let shapes = [Arc::new(source), Arc::new(target)];
-    let seed = recipe.training.seed;
-    let mut found = [0, 1].map(|k| thicken(&keys[k], k, &shapes[k], seed));
-    let carried = CarriedShapes::new(field.clone(), shapes, false);
-    let is_missing = |k: usize| {
-        let [own, other] = [k, 1 - k].map(|k| &keys[k]);
-        if own.sheet.is_some() {
-            return false;
-        }
-        let some = some_of(&other.cloud.points, LOOKED_AT);
-        let arrived = carried.carry(&some, other.time, own.time);
-        share_beyond(&own.cloud.points, &own.border, &arrived) > LEAST_MISSING
-    };
-    let missing = [0, 1].map(is_missing);
+    Ok(found)
+}
+
+/// The neighbour that completes key frame `k`: one that is known itself, the next one if both are.
+fn neighbour(keys: &[Keyframe], k: usize) -> usize {
+    let beside = [Some(k + 1), k.checked_sub(1)].into_iter().flatten();
+    let beside: Vec<usize> = beside.filter(|k| *k < keys.len()).collect();
+    let known = beside.iter().find(|k| encloses(&keys[**k]));
+    *known.unwrap_or(&beside[0])
+}
+
+/// The points of key frame `k` with those that complete it, by what is carried from key frame `s` to the next; `None`
+/// if so little is missing that it counts as known.
+fn of_part<const H: usize>(
+    carried: CarriedShapes<H>,
+    [s, k]: [usize; 2],
+    recipe: &Recipe,
+    keyframes: &Keyframes,
+) -> Result<Option<PointCloud>, String> {
+    let [own, other] = [k, 2 * s + 1 - k].map(|k| &keyframes.keys[k]);
+    // Within the interval.
+    let time = (k - s) as f64;
+    let some = some_of(&other.cloud.points, LOOKED_AT);
+    let arrived = carried.carry(&some, 1.0 - time, time);
+    if share_beyond(&own.cloud.points, &own.border, &arrived) <= LEAST_MISSING {
+        return Ok(None);
+    }
     let learned = Learned {
         deformation: Box::new(carried),
         template: None,
@@ -75,16 +99,18 @@ pub(super) fn completed(
     };
     let (low, high) = (learned.bounds.min, learned.bounds.max);
     let grid = Grid::new(low, high, CELLS).map_err(|error| error.to_string())?;
-    for k in [0, 1].into_iter().filter(|k| missing[*k]) {
-        let time = keys[k].time;
-        let surface = learned.surface_at(&grid, time, PIECE, &mut |_| ());
-        let surface = surface.map_err(|error| error.to_string())?;
-        let normals = |points: &[[f32; 3]]| {
-            let field = learned.deformation.field();
-            let gradients = field.map(|field| field.gradients(points, time));
-            gradients.into_iter().flatten().map(unit).collect()
-        };
-        found[k] = complete(&keys[k], k, &surface.mesh, normals, seed);
-    }
-    Ok(found)
+    let surface = learned.surface_at(&grid, time, PIECE, &mut |_| ());
+    let surface = surface.map_err(|error| error.to_string())?;
+    let normals = |points: &[[f32; 3]]| {
+        let field = learned.deformation.field();
+        let gradients = field.map(|field| field.gradients(points, time));
+        gradients.into_iter().flatten().map(unit).collect()
+    };
+    Ok(complete(
+        own,
+        k,
+        &surface.mesh,
+        normals,
+        recipe.training.seed,
+    ))
 }

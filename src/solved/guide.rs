@@ -1,16 +1,19 @@
 //! The field of the preset `instant` as a guide: what the Velocity-Net of other presets learns first
 //! (`training.guided-until`).
 
-use isomorph_spline::{Solver, SplineError, SplineField};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use isomorph_spline::{SequenceField, SplineError, SplineField};
 use isomorph_training::data::Guide;
 use isomorph_training::method::{self, spline};
 
 use super::completed::completed;
-use super::problem::{options, problem, weights};
+use super::motion::Field;
+use super::problem::{options, solver};
 use crate::recipe::{Recipe, RecipeError};
 use crate::shape::{Keyframes, PointCloud};
 
-/// A solved field, and in how many steps its paths are followed.
+/// A solved field between two shapes, and in how many steps its paths are followed.
 struct SplineGuide {
     field: SplineField,
     trajectory_steps: usize,
@@ -28,27 +31,118 @@ impl Guide for SplineGuide {
     }
 }
 
+/// A solved field through many key frames, and in how many steps its paths are followed from one to the next.
+struct SequenceGuide {
+    field: SequenceField,
+    trajectory_steps: usize,
+    /// The interval used last: the samples of a step lie in one.
+    part: Mutex<Option<(usize, Arc<SplineField<f32, 2>>)>>,
+}
+
+impl SequenceGuide {
+    /// The interval of a time, and the time within it.
+    fn at(&self, time: f32) -> usize {
+        let times = self.field.times();
+        let after = times.partition_point(|key| *key <= f64::from(time));
+        after.saturating_sub(1).min(times.len() - 2)
+    }
+
+    fn within(&self, s: usize, time: f32) -> f32 {
+        let times = self.field.times();
+        let [from, to] = [times[s], times[s + 1]];
+        (((f64::from(time) - from) / (to - from)) as f32).clamp(0.0, 1.0)
+    }
+
+    fn length(&self, s: usize) -> f32 {
+        let times = self.field.times();
+        (times[s + 1] - times[s]) as f32
+    }
+
+    fn part(&self, s: usize) -> Arc<SplineField<f32, 2>> {
+        let mut part = self.part.lock().unwrap_or_else(PoisonError::into_inner);
+        match &*part {
+            Some((known, field)) if *known == s => Arc::clone(field),
+            _ => {
+                let field = Arc::new(self.field.part(s));
+                *part = Some((s, Arc::clone(&field)));
+                field
+            }
+        }
+    }
+
+    /// What `of` gives for the rows of each interval, in their own order.
+    fn by_interval(
+        &self,
+        middles: impl Iterator<Item = f32>,
+        mut of: impl FnMut(usize, &[usize]) -> Vec<[f32; 3]>,
+    ) -> Vec<[f32; 3]> {
+        let intervals: Vec<usize> = middles.map(|time| self.at(time)).collect();
+        let mut out = vec![[0.0; 3]; intervals.len()];
+        for s in 0..self.field.times().len() - 1 {
+            let rows: Vec<usize> = (0..intervals.len())
+                .filter(|k| intervals[*k] == s)
+                .collect();
+            if rows.is_empty() {
+                continue;
+            }
+            for (row, found) in rows.iter().zip(of(s, &rows)) {
+                out[*row] = found;
+            }
+        }
+        out
+    }
+}
+
+impl Guide for SequenceGuide {
+    fn velocities(&self, places: &[[f32; 3]], times: &[f32]) -> Vec<[f32; 3]> {
+        self.by_interval(times.iter().copied(), |s, rows| {
+            let x: Vec<_> = rows.iter().map(|k| places[*k]).collect();
+            let t: Vec<_> = rows.iter().map(|k| self.within(s, times[*k])).collect();
+            let jets = self.part(s).jets(&x, &t).into_iter();
+            let length = self.length(s);
+            jets.map(|jet| jet.value.map(|v| v / length)).collect()
+        })
+    }
+
+    fn carried(&self, places: &[[f32; 3]], from: &[f32], to: &[f32]) -> Vec<[f32; 3]> {
+        let middles = from.iter().zip(to).map(|(from, to)| (from + to) / 2.0);
+        self.by_interval(middles, |s, rows| {
+            let x: Vec<_> = rows.iter().map(|k| places[*k]).collect();
+            let times = |of: &[f32]| rows.iter().map(|k| self.within(s, of[*k])).collect();
+            let (from, to): (Vec<_>, Vec<_>) = (times(from), times(to));
+            let field = self.part(s);
+            field.carry_each(&x, &from, &to, self.trajectory_steps)
+        })
+    }
+}
+
 /// What a field that is solved for gives to the training of networks.
 pub(crate) struct Guidance {
     /// The field.
-    pub guide: Box<dyn Guide>,
+    pub guide: Arc<dyn Guide>,
     /// For each shape that is known in part, its points and those that complete it.
-    pub completed: [Option<PointCloud>; 2],
+    pub completed: Vec<Option<PointCloud>>,
 }
 
-/// Keys of the steps, which the recipe's own say nothing of.
-const OF_STEPS: [&str; 4] = [
-    "preset=instant",
-    "training.steps=18",
-    "training.time-steps=3",
-    "training.correspondence-batch=1000",
+/// Keys of the steps, which the recipe's own say nothing of, between two shapes and through more.
+const OF_STEPS: [[&str; 4]; 2] = [
+    [
+        "preset=instant",
+        "training.steps=18",
+        "training.time-steps=3",
+        "training.correspondence-batch=1000",
+    ],
+    [
+        "preset=instant",
+        "training.steps=10",
+        "training.time-steps=1",
+        "training.correspondence-batch=1000",
+    ],
 ];
 
 /// Why no splines can stand in for the motion that a recipe asks for, if so.
-fn misfit(recipe: &Recipe, keyframes: &Keyframes) -> Option<&'static str> {
-    if keyframes.keys.len() != 2 {
-        Some("splines take two shapes")
-    } else if !recipe.velocity.time_dependent {
+fn misfit(recipe: &Recipe) -> Option<&'static str> {
+    if !recipe.velocity.time_dependent {
         Some("splines depend on time, and velocity.time-dependent is false")
     } else if recipe.loss.smoothness > 0.0 {
         Some("splines have no term for loss.smoothness")
@@ -62,7 +156,8 @@ fn misfit(recipe: &Recipe, keyframes: &Keyframes) -> Option<&'static str> {
 /// The recipe with the preset `instant`.
 fn as_solved(recipe: &Recipe) -> Result<Recipe, RecipeError> {
     let mut solved = recipe.clone();
-    solved.with_all(&OF_STEPS.map(str::to_owned))?;
+    let many = usize::from(recipe.data.keyframes.len() > 2);
+    solved.with_all(&OF_STEPS[many].map(str::to_owned))?;
     Ok(solved)
 }
 
@@ -85,25 +180,34 @@ pub(crate) fn sheet_thickness(recipe: &Recipe) -> Option<f64> {
 /// A motion that splines do not have, what the solver refuses, or a surface that is not found: the reason, as a part
 /// of a sentence.
 pub(crate) fn guide(recipe: &Recipe, keyframes: &Keyframes) -> Result<Guidance, String> {
-    if let Some(reason) = misfit(recipe, keyframes) {
+    if let Some(reason) = misfit(recipe) {
         return Err(reason.to_owned());
     }
     let solved = as_solved(recipe).map_err(|error| error.to_string())?;
-    let options = options(&solved);
-    let trajectory_steps = 2 * options.trajectory_steps;
-    let found: Result<SplineField, SplineError> = (|| {
-        let mut solver = Solver::new(problem(&solved, keyframes, 0), weights(&solved), options)?;
+    let trajectory_steps = 2 * options(&solved).trajectory_steps;
+    let found: Result<Field, SplineError> = (|| {
+        let mut solver = solver(&solved, keyframes)?;
         for step in 0..solver.steps() {
             solver.advance(step)?;
         }
-        Ok(solver.field().clone())
+        Ok(solver.field())
     })();
-    let field = found.map_err(|error| error.to_string())?;
-    Ok(Guidance {
-        completed: completed(&field, recipe, keyframes)?,
-        guide: Box::new(SplineGuide {
-            field,
-            trajectory_steps,
+    match found.map_err(|error| error.to_string())? {
+        Field::Pair(field) => Ok(Guidance {
+            completed: completed(|_| field.clone(), recipe, keyframes)?,
+            guide: Arc::new(SplineGuide {
+                field,
+                trajectory_steps,
+            }),
         }),
-    })
+        Field::Sequence(field) => Ok(Guidance {
+            completed: completed(|s| field.part(s), recipe, keyframes)?,
+            guide: Arc::new(SequenceGuide {
+                field,
+                trajectory_steps,
+                part: Mutex::default(),
+            }),
+        }),
+        Field::Pairs(..) => unreachable!("the preset has one field through all key frames"),
+    }
 }

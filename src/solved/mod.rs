@@ -44,7 +44,6 @@ use self::carried::CarriedShapes;
 pub(crate) use self::completed::encloses;
 pub(crate) use self::guide::{Guidance, guide, sheet_thickness};
 use self::motion::{AnySolver, Field};
-use self::sequence::CarriedSequence;
 use self::shapes::Shapes;
 use crate::recipe::Recipe;
 use crate::shape::{Keyframe, Keyframes, SolidParts, key_name};
@@ -206,11 +205,11 @@ impl Trainer for Solved {
                 Box::new(CarriedShapes::new(field, shapes, false))
             }
             (Field::Sequence(field), Shapes::Many(shapes)) => {
-                Box::new(CarriedSequence::of(field, shapes))
+                Box::new(sequence::through(field, shapes))
             }
             (Field::Pairs(fields, times), Shapes::Many(shapes)) => {
                 let of = move |s: usize| fields[s].clone();
-                Box::new(CarriedSequence::new(Box::new(of), times, shapes))
+                Box::new(sequence::in_turns(Box::new(of), times, shapes))
             }
             _ => unreachable!("there are as many shapes as key frames"),
         }

@@ -49,6 +49,15 @@ impl AnySolver {
         }
     }
 
+    /// How many steps it takes.
+    pub(super) fn steps(&self) -> usize {
+        match self {
+            Self::Pair(solver) => solver.steps(),
+            Self::Sequence(solver) => solver.steps(),
+            Self::Pairs(solvers, _) => solvers[0].steps(),
+        }
+    }
+
     /// The weights of the terms.
     pub(super) fn weights(&self) -> &Weights {
         match self {

@@ -2,7 +2,7 @@
 //! known of which points correspond.
 
 use std::num::NonZeroUsize;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use serde::{Deserialize, Serialize};
 
@@ -76,7 +76,7 @@ pub trait Surroundings: Send + Sync {
     fn nearest(&self, point: usize, count: NonZeroUsize) -> Vec<usize>;
 }
 
-/// A velocity field that is there before training, between two key frames.
+/// A velocity field that is there before training. Points are carried within one interval between two key frames.
 pub trait Guide: Send + Sync {
     /// The velocities at places and their times.
     fn velocities(&self, places: &[[f32; 3]], times: &[f32]) -> Vec<[f32; 3]>;
@@ -85,16 +85,72 @@ pub trait Guide: Send + Sync {
     fn carried(&self, places: &[[f32; 3]], from: &[f32], to: &[f32]) -> Vec<[f32; 3]>;
 }
 
-/// The points of one key frame, normalised.
+/// A part of a guide, over a time from 0 to 1.
+struct PartOfGuide {
+    whole: Arc<dyn Guide>,
+    from: f32,
+    length: f32,
+}
+
+impl PartOfGuide {
+    fn whole_times(&self, times: &[f32]) -> Vec<f32> {
+        let whole = |time: &f32| self.from + time * self.length;
+        times.iter().map(whole).collect()
+    }
+}
+
+impl Guide for PartOfGuide {
+    fn velocities(&self, places: &[[f32; 3]], times: &[f32]) -> Vec<[f32; 3]> {
+        let found = self.whole.velocities(places, &self.whole_times(times));
+        let scaled = found.into_iter().map(|v| v.map(|x| x * self.length));
+        scaled.collect()
+    }
+
+    fn carried(&self, places: &[[f32; 3]], from: &[f32], to: &[f32]) -> Vec<[f32; 3]> {
+        let (from, to) = (self.whole_times(from), self.whole_times(to));
+        self.whole.carried(places, &from, &to)
+    }
+}
+
+/// The points of one key frame, normalised. A clone shares them.
+#[derive(Clone)]
 pub struct KeyPoints {
     /// Its time, 0 to 1.
     pub time: f32,
     /// Positions.
-    pub points: Vec<[f32; 3]>,
+    pub points: Arc<[[f32; 3]]>,
     /// Unit normals, one per point.
-    pub normals: Option<Vec<[f32; 3]>>,
+    pub normals: Option<Arc<[[f32; 3]]>>,
     /// Searches around them.
-    pub around: Box<dyn Surroundings>,
+    pub around: Arc<dyn Surroundings>,
+    /// Found on first use.
+    hollows: Arc<OnceLock<Hollows>>,
+}
+
+impl KeyPoints {
+    /// Positions at a time, with unit normals where they are known, and searches around them.
+    pub fn new(
+        time: f32,
+        points: Vec<[f32; 3]>,
+        normals: Option<Vec<[f32; 3]>>,
+        around: Arc<dyn Surroundings>,
+    ) -> Self {
+        Self {
+            time,
+            points: points.into(),
+            normals: normals.map(Arc::from),
+            around,
+            hollows: Arc::default(),
+        }
+    }
+
+    /// The same at another time.
+    pub(crate) fn at(&self, time: f32) -> Self {
+        Self {
+            time,
+            ..self.clone()
+        }
+    }
 }
 
 /// A place in one key frame and the place in the next one that it moves to.
@@ -109,9 +165,9 @@ pub struct TrainingData {
     /// The box around all key frames.
     pub bounds: Bounds,
     /// What the velocity field learns from first, where the recipe says so.
-    pub guide: Option<Box<dyn Guide>>,
-    /// Found on first use.
-    pub(crate) hollows: OnceLock<Vec<Hollows>>,
+    pub guide: Option<Arc<dyn Guide>>,
+    /// Made on first use.
+    intervals: OnceLock<Vec<TrainingData>>,
 }
 
 /// A hollow is looked after if its middle is at least so many widths of the widest band away from the surface: the
@@ -133,19 +189,44 @@ impl TrainingData {
             keys,
             between,
             guide: None,
-            hollows: OnceLock::new(),
+            intervals: OnceLock::new(),
         }
     }
 
-    /// The hollows of each key frame within the box of a recipe.
-    pub(crate) fn hollows(&self, training: &TrainingRecipe) -> &[Hollows] {
-        self.hollows.get_or_init(|| {
+    /// The hollows of a key frame within the box of a recipe.
+    pub(crate) fn hollows<'a>(&self, key: &'a KeyPoints, training: &TrainingRecipe) -> &'a Hollows {
+        key.hollows.get_or_init(|| {
             let bounds = self.bounds.padded(training.box_margin as f32);
             let widest = training.band_widths.iter().copied().fold(0.0, f64::max);
-            let depth = (BANDS * widest) as f32;
-            let of = |key| Hollows::of(key, &bounds, depth);
-            self.keys.iter().map(of).collect()
+            Hollows::of(key, &bounds, (BANDS * widest) as f32)
         })
+    }
+
+    /// Key frame `s` and the next as data of their own, whose times are 0 and 1. Points and searches are shared, the
+    /// box is that of all key frames, and velocities of the guide are per length of the interval.
+    pub(crate) fn interval(&self, s: usize) -> &Self {
+        let all = self.intervals.get_or_init(|| {
+            let of = |s: usize| {
+                let [from, to] = [0, 1].map(|end| self.keys[s + end].time);
+                let guide = self.guide.clone().map(|whole| {
+                    let part = PartOfGuide {
+                        whole,
+                        from,
+                        length: to - from,
+                    };
+                    Arc::new(part) as Arc<dyn Guide>
+                });
+                Self {
+                    keys: vec![self.keys[s].at(0.0), self.keys[s + 1].at(1.0)],
+                    between: vec![self.between[s].clone()],
+                    bounds: self.bounds,
+                    guide,
+                    intervals: OnceLock::new(),
+                }
+            };
+            (0..self.between.len()).map(of).collect()
+        });
+        &all[s]
     }
 
     /// How many correspondences are known in all.
@@ -224,12 +305,7 @@ mod tests {
 
     #[test]
     fn pairs_are_counted_through_all_intervals() {
-        let key = |time: f32| KeyPoints {
-            time,
-            points: vec![[time; 3]],
-            normals: None,
-            around: Box::new(Nothing),
-        };
+        let key = |time: f32| KeyPoints::new(time, vec![[time; 3]], None, Arc::new(Nothing));
         let pair = |x: f32| ([x; 3], [x + 0.5; 3]);
         let keys = [0.0, 0.25, 1.0].map(key).into();
         let data = TrainingData::new(keys, vec![vec![pair(1.0)], vec![pair(2.0), pair(3.0)]]);

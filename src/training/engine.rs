@@ -18,7 +18,8 @@ use isomorph_model::{TrainBackend, product};
 
 use crate::data::{Bounds, TrainingData};
 use crate::deformation::{Deformation, OnHost};
-use crate::method::{self, Method};
+use crate::in_turns::{InTurns, Kept};
+use crate::method::{self, Method, Through};
 use crate::posed::{Slopes, mean_of};
 use crate::probe::{self, Reading};
 use crate::recipe::Recipe;
@@ -318,10 +319,21 @@ impl<B: TrainBackend> Trainer for InTraining<B> {
     }
 
     fn deformation(&self) -> Box<dyn Deformation> {
-        Box::new(OnHost {
-            geometry: self.method.geometry(),
-            motion: self.method.motion(),
-            device: self.device.clone(),
-        })
+        let device = self.device.clone();
+        let on_host = move |geometry, motion| OnHost {
+            geometry,
+            motion,
+            device: device.clone(),
+        };
+        match self.method.through() {
+            Some(Through { times, part }) => {
+                let of = move |s, _: &Kept<_>| {
+                    let (geometry, motion) = part(s);
+                    on_host(Some(geometry), Some(motion))
+                };
+                Box::new(InTurns::new(times, Box::new(of)))
+            }
+            None => Box::new(on_host(self.method.geometry(), self.method.motion())),
+        }
     }
 }

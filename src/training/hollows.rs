@@ -130,6 +130,7 @@ fn cell(number: usize) -> [usize; 3] {
 #[cfg(test)]
 mod tests {
     use std::num::NonZeroUsize;
+    use std::sync::Arc;
 
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
@@ -158,12 +159,9 @@ mod tests {
     }
 
     fn hollows(hollow: f32, channel: f32) -> Hollows {
-        let key = KeyPoints {
-            time: 0.0,
-            points: vec![[0.0; 3]],
-            normals: Some(vec![[1.0, 0.0, 0.0]]),
-            around: Box::new(Ball { hollow, channel }),
-        };
+        let around = Arc::new(Ball { hollow, channel });
+        let normals = Some(vec![[1.0, 0.0, 0.0]]);
+        let key = KeyPoints::new(0.0, vec![[0.0; 3]], normals, around);
         let bounds = Bounds {
             min: [-1.2; 3],
             max: [1.2; 3],

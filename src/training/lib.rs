@@ -10,6 +10,7 @@
 //! | `recipe/` | the TOML file that decides a run, typed, checked and printed back |
 //! | `data.rs` | key frames as points: what methods draw their samples from |
 //! | `samples.rs` | the samples of a step, on the host, and their equal parts |
+//! | `turns.rs` | which interval of many a step is made in |
 //! | `hollows.rs` | where a surface encloses space that is not inside |
 //! | `guided.rs` | what V learns from a field that is there already |
 //! | `method/` | what is trained: the default method and those that it is compared with, one file each |
@@ -25,6 +26,7 @@
 //! | `engine.rs` | the border to training: a backend without its type |
 //! | `probe.rs` | the operations of a run in small, to compare a device with another |
 //! | `deformation.rs` | the border to what was trained: values and motion of points on the host |
+//! | `in_turns.rs` | the same through many key frames: what there is from each to the next |
 //! | `report.rs` | phases and terms, as they are reported |
 //! | `flop.rs` | what a step costs |
 //! | `spheres.rs` | key frames that need no file: for measuring and testing |
@@ -42,6 +44,7 @@ pub mod flop;
 mod flow_step;
 pub mod guided;
 mod hollows;
+pub mod in_turns;
 pub mod method;
 mod motion;
 mod network_step;
@@ -56,6 +59,7 @@ pub mod schedule;
 pub mod settings;
 mod spheres;
 mod tensors;
+mod turns;
 pub mod weights;
 mod workers;
 

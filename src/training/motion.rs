@@ -1,26 +1,27 @@
-//! What a step needs of the Velocity-Net: trajectories, the matching term, and the priors. The same for
+//! What a step needs of `V`: trajectories, the matching term, and the priors. The same for
 //! both geometries.
 
-use burn::module::AutodiffModule;
 use burn::tensor::Tensor;
 use isomorph_model::flow::transport::transport;
 use isomorph_model::loss::{divergence, matching, screw, smoothness, strain};
-use isomorph_model::operators::{Operators, VelocityJet, VelocityRequest};
+use isomorph_model::operators::{Operators, VelocityField, VelocityJet, VelocityRequest};
 use isomorph_model::trajectory::integrate;
-use isomorph_model::{Objective, TrainBackend, VelocityNet};
+use isomorph_model::{Objective, TrainBackend};
 
 use crate::recipe::LossRecipe;
 use crate::samples::Batch;
 use crate::settings::Settings;
 use crate::tensors::{column, rows};
 
-/// The Velocity-Net in one step.
+/// The velocity field in one step.
 #[derive(Clone, Copy)]
 pub(crate) struct Motion<'a, B: TrainBackend> {
     /// Weights and methods.
     pub settings: &'a Settings,
-    /// The Velocity-Net.
-    pub v: &'a VelocityNet<B>,
+    /// `V`.
+    pub v: &'a dyn VelocityField<B>,
+    /// The same `V` for values.
+    pub still: &'a dyn VelocityField<B::InnerBackend>,
     /// The scale of the matching term in this step; 0 is the plain distance.
     pub matching_scale: f64,
     /// Where tensors live.
@@ -93,7 +94,7 @@ impl<B: TrainBackend> Motion<'_, B> {
     /// and there are any.
     pub(crate) fn carry_constants(&self, batch: &Batch, normals: bool) -> Still<B> {
         let settings = self.settings;
-        let v = self.v.valid();
+        let v = self.still;
         let x = rows::<B::InnerBackend, 3>(&batch.starts.points, self.device);
         let from = column::<B::InnerBackend>(&batch.starts.times, self.device);
         let to = column::<B::InnerBackend>(&batch.stops, self.device);
@@ -101,7 +102,7 @@ impl<B: TrainBackend> Motion<'_, B> {
         if normals && has_normals(batch) {
             let n = rows::<B::InnerBackend, 3>(&batch.starts.normals, self.device);
             let operators = &settings.derivatives;
-            let (positions, n) = transport(operators, &v, x, n, from, to, steps, integrator);
+            let (positions, n) = transport(operators, v, x, n, from, to, steps, integrator);
             Still {
                 positions,
                 normals: Some(n),
@@ -182,11 +183,10 @@ impl<B: TrainBackend> Motion<'_, B> {
 
     /// The jet of a `V` that does not train, as constants.
     pub(crate) fn constant_jet(&self, at: &Collocation<B>) -> VelocityJet<B> {
-        let still = self.v.valid();
         let (x, t) = (at.x.clone().inner(), at.t.clone().inner());
         let request = VelocityRequest::default();
         let operators = &self.settings.derivatives;
-        constant(operators.velocity_jet(&still, x, t, request))
+        constant(operators.velocity_jet(self.still, x, t, request))
     }
 
     fn rows(&self, points: &[[f32; 3]]) -> Tensor<B, 2> {

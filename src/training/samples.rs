@@ -28,7 +28,7 @@ use crate::recipe::{TimeSampling, TrainingRecipe};
 /// What samples are drawn for. The numbers name the streams: they stay, so that a seed keeps its samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u64)]
-enum Purpose {
+pub(crate) enum Purpose {
     Ends = 0,
     Starts = 1,
     Stops = 2,
@@ -39,6 +39,7 @@ enum Purpose {
     Space = 7,
     Between = 8,
     Neighbours = 9,
+    Turns = 10,
 }
 
 /// Bits of a stream's number that name the purpose.
@@ -46,7 +47,7 @@ const PURPOSE_BITS: u32 = 4;
 
 /// The random numbers of one purpose in one step. Streams below those of the first step are left to the
 /// sampling of the shapes.
-fn stream(seed: u64, step: usize, purpose: Purpose) -> ChaCha8Rng {
+pub(crate) fn stream(seed: u64, step: usize, purpose: Purpose) -> ChaCha8Rng {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream((step as u64 + 1) << PURPOSE_BITS | purpose as u64);
     rng
@@ -305,14 +306,10 @@ impl EndBatch {
         let bounds = data.bounds.padded(training.box_margin as f32);
         let (mut surface, mut space) = (Samples::default(), Samples::default());
         let (of_surface, of_space) = (&mut stream(Purpose::Surface), &mut stream(Purpose::Space));
-        let hollows = if measured {
-            data.hollows(training)
-        } else {
-            &[]
-        };
-        for (number, key) in data.keys.iter().enumerate() {
+        for key in &data.keys {
             pick(key, count, &mut surface, of_surface);
-            let hollow = hollows.get(number).filter(|hollow| !hollow.is_empty());
+            let hollow = measured.then(|| data.hollows(key, training));
+            let hollow = hollow.filter(|hollow| !hollow.is_empty());
             let filled = band + ((count - band) as f64 * IN_HOLLOWS).round() as usize;
             for k in 0..count {
                 space.points.push(if k < band {

@@ -1,6 +1,7 @@
 //! Two spheres of points: shapes for measuring and testing that need no file.
 
 use std::num::NonZeroUsize;
+use std::sync::Arc;
 
 use crate::data::{KeyPoints, Surroundings, TrainingData};
 
@@ -28,15 +29,11 @@ impl TrainingData {
         let key = |time: f32, offset: f32| {
             let at = |[x, y, z]: &[f32; 3]| [RADIUS * x + offset, RADIUS * y, RADIUS * z];
             let points: Vec<[f32; 3]> = normals.iter().map(at).collect();
-            KeyPoints {
-                time,
-                normals: Some(normals.clone()),
-                around: Box::new(Sphere {
-                    centre: [offset, 0.0, 0.0],
-                    points: points.clone(),
-                }),
-                points,
-            }
+            let around = Sphere {
+                centre: [offset, 0.0, 0.0],
+                points: points.clone(),
+            };
+            KeyPoints::new(time, points, Some(normals.clone()), Arc::new(around))
         };
         let (source, target) = (key(0.0, -OFFSET), key(1.0, OFFSET));
         let pairs = source.points.iter().copied();
@@ -85,7 +82,7 @@ mod tests {
             assert_eq!(source[1..], target[1..]);
         }
         for key in &data.keys {
-            for x in &key.points {
+            for x in key.points.iter() {
                 let off = key.around.signed_distance(*x).expect("it is known");
                 assert!(off.abs() < 1e-6, "{off}");
             }

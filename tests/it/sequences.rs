@@ -133,11 +133,60 @@ fn morph_takes_any_number_of_files_and_their_times() {
     place
         .isomorph(&[&morph[..], &two].concat())
         .refused(2, &["2 times for 3 files"]);
-    let preset = ["--preset", "quick", "-o", "other"];
-    place.isomorph(&[&morph[..], &preset].concat()).refused(
-        2,
-        &["networks are trained on two key frames, not 3", "instant"],
+    let preset = ["--preset", "paper", "-o", "other"];
+    place
+        .isomorph(&[&morph[..], &preset].concat())
+        .refused(2, &["takes two key frames, not 3", "instant"]);
+}
+
+#[test]
+fn networks_learn_one_motion_through_all_key_frames_and_go_on_where_they_stopped() {
+    let _turn = turn();
+    let place = falling(&[0, 1, 2]);
+    place.write(
+        "recipe.toml",
+        "preset = \"quick\"\n[data]\nsequence = \"scan-*.ply\"\npoints = 2000\n\
+         correspondences = \"same-vertices\"\n[training]\nsteps = 300\nbatch = 600\n\
+         [implicit]\nwidth = 48\ndepth = 3\n[velocity]\nwidth = 48\ndepth = 3\n\
+         [result]\nframes = 3\nresolution = 32\n[checkpoint]\nevery = 150\nkeep = 2\n",
     );
+    let trained = place
+        .isomorph(&["train", "recipe.toml", "--run", "run"])
+        .succeeded();
+    for said in ["3 key frames of", "end fields"] {
+        assert!(trained.stderr.contains(said), "{said}: {}", trained.stderr);
+    }
+    assert!(!trained.stderr.contains("without splines"));
+    let run = place.run("run");
+    let listed = json(&run.path("meshes/frames.json"));
+    let listed = listed.as_array().expect("a list");
+    let keys: Vec<(f64, u64)> = (listed.iter())
+        .filter_map(|frame| Some((frame["time"].as_f64()?, frame["key"].as_u64()?)))
+        .collect();
+    assert_eq!(keys, [(0.0, 0), (1.0, 1), (2.0, 2)]);
+    // The truth is -.05 t^2; straight lines would be at -.125 at 1.5.
+    let at = ["--times", "1,1.5", "--carry", "-o", "half", "--quiet"];
+    place
+        .isomorph(&[&["extract", "run"], &at[..]].concat())
+        .succeeded();
+    for (file, wanted) in [
+        ("half/surface-000.ply", -0.05),
+        ("half/surface-001.ply", -0.1125),
+        ("half/carried-000.ply", -0.05),
+        ("half/carried-001.ply", -0.1125),
+    ] {
+        let found = mean_z(&ply::Ply::read(&place.path(file)).mesh());
+        assert!((found - wanted).abs() < 0.02, "{file}: {found}, {wanted}");
+    }
+    // From the checkpoint in the middle, to the same bytes.
+    let last = "checkpoints/step-000300/velocity.mpk";
+    let wanted = fs::read(run.path(last)).expect("the last checkpoint");
+    fs::remove_dir_all(run.path("checkpoints/step-000300")).expect("it is there");
+    place.isomorph(&["resume", "run", "--quiet"]).succeeded();
+    assert!(fs::read(run.path(last)).expect("again") == wanted);
+    place
+        .isomorph(&["export", "run"])
+        .refused(2, &["trained on two key frames", "instant"]);
 }
 
 #[test]
@@ -346,4 +395,62 @@ fn splines_and_shapes_are_exported_with_a_description() {
         assert_eq!(*sides, serde_json::json!(wanted));
     }
     assert_eq!(header["shape.2.triangles"]["dtype"], "U32");
+}
+
+#[test]
+fn a_table_names_each_point_in_every_key_frame() {
+    let _turn = turn();
+    let place = Workplace::new();
+    // The vertices of each file stand in another order.
+    let sphere = Mesh::sphere(1.0, 3);
+    let count = sphere.vertices.len();
+    let rank = |k: usize, step: usize| (k * step) % count;
+    for (key, step) in [1, 5, 7].into_iter().enumerate() {
+        let mut moved = sphere.clone();
+        for k in 0..count {
+            let x = sphere.vertices[k];
+            let turned = 0.4 * key as f64;
+            let (sin, cos) = turned.sin_cos();
+            let at = [cos * x[0] - sin * x[1], sin * x[0] + cos * x[1], 1.3 * x[2]];
+            moved.vertices[rank(k, step)] = at;
+        }
+        for triangle in &mut moved.triangles {
+            for corner in triangle {
+                *corner = rank(*corner as usize, step) as u32;
+            }
+        }
+        place.write(&format!("scan-{key}.ply"), ply::text(&moved));
+    }
+    let line = |k: usize| match k % 10 {
+        0 => format!("{k},-1,{}\n", rank(k, 7)),
+        _ => format!("{k},{},{}\n", rank(k, 5), rank(k, 7)),
+    };
+    let table: String = (0..count).map(line).collect();
+    place.write("points.csv", format!("first,second,third\n{table}"));
+    let files = ["init", "scan-0.ply", "scan-1.ply", "scan-2.ply"];
+    let known = ["--correspondences", "points.csv"];
+    let recipe = place.isomorph(&[&files[..], &known].concat()).succeeded();
+    place.write("recipe.toml", &recipe.stdout);
+    let train = ["train", "recipe.toml", "--run", "run", "--set"];
+    let all = ["data.correspondence-fraction=1", "--set", "result.frames=0"];
+    let ended = place
+        .isomorph(&[&train[..], &all, &SMALL].concat())
+        .succeeded();
+    let said = "have no partner (-1)";
+    assert!(ended.stderr.contains(said), "{}", ended.stderr);
+    // A sphere says nothing of a turn about its axis; the points do.
+    let warp = ["warp", "run", "--points", "scan-0.ply", "-o", "moved.ply"];
+    place.isomorph(&warp).succeeded();
+    let moved = ply::Ply::read(&place.path("moved.ply")).mesh();
+    let truth = ply::Ply::read(&place.path("scan-2.ply")).mesh();
+    let off = |k: usize| {
+        let (a, b) = (moved.vertices[k], truth.vertices[rank(k, 7)]);
+        (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().sqrt()
+    };
+    let mean = (0..count).map(off).sum::<f64>() / count as f64;
+    assert!(mean < 0.03, "{mean}");
+    place.write("points.csv", "0,1,2\n3,4\n");
+    place
+        .isomorph(&[&files[..], &known].concat())
+        .refused(1, &["points.csv:2", "-1 where the point is not known"]);
 }

@@ -61,5 +61,5 @@ pub use options::{Options, Weights};
 pub use problem::{Cloud, Pairs, Problem};
 pub use real::Real;
 pub use samples::{Arrival, BandPlace, Samples};
-pub use sequence::{SequenceField, SequenceProblem, SequenceSolver};
+pub use sequence::{SequenceField, SequenceProblem, SequenceSolver, quadratics};
 pub use solver::{Solver, StepReport, Terms};

@@ -39,6 +39,19 @@ impl EndFieldsConfig {
     }
 }
 
+/// The field of key frame `k` of many: its parameters have numbers of their own.
+pub fn end_field<B: ModelBackend>(
+    implicit: ImplicitNetConfig,
+    k: usize,
+    seed: u64,
+    device: &B::Device,
+) -> ImplicitNet<B> {
+    renumbered(
+        implicit.init(seed.wrapping_add(k as u64), device),
+        k as u64 * SECOND,
+    )
+}
+
 /// The two signed distance fields `g` and `h`.
 #[derive(Module, Debug)]
 pub struct EndFields<B: Backend> {
@@ -54,6 +67,11 @@ impl<B: ModelBackend> EndFields<B> {
             target: renumbered(target, SECOND),
         };
         apart(ends, "EndFields")
+    }
+
+    /// Of the networks of two key frames, whose parameters have different numbers already ([`end_field`]).
+    pub fn beside(source: ImplicitNet<B>, target: ImplicitNet<B>) -> Self {
+        apart(Self { source, target }, "EndFields")
     }
 
     /// `g`, the field of the source.

@@ -4,7 +4,7 @@ use burn::tensor::Tensor;
 
 use super::morph::{Geometry, Motion, follow};
 use crate::autodiff::ModelBackend;
-use crate::nets::{ImplicitNet, SplineVelocity, VelocityNet};
+use crate::nets::{ImplicitNet, IntervalVelocity, SplineVelocity, VelocityNet};
 use crate::operators::reverse;
 
 impl<B: ModelBackend> Geometry<B> for ImplicitNet<B> {
@@ -18,24 +18,20 @@ impl<B: ModelBackend> Geometry<B> for ImplicitNet<B> {
     }
 }
 
-impl<B: ModelBackend> Motion<B> for VelocityNet<B> {
-    fn carry(&self, x: Tensor<B, 2>, from: f64, to: f64) -> Tensor<B, 2> {
-        follow(|x, t| self.forward(x, t), x, from, to)
-    }
+/// A velocity field moves points along itself.
+macro_rules! moves_points {
+    ($($velocity:ident),+) => {$(
+        impl<B: ModelBackend> Motion<B> for $velocity<B> {
+            fn carry(&self, x: Tensor<B, 2>, from: f64, to: f64) -> Tensor<B, 2> {
+                follow(|x, t| self.forward(x, t), x, from, to)
+            }
 
-    fn velocity(&self, x: Tensor<B, 2>, time: f64) -> Option<Tensor<B, 2>> {
-        let t = Tensor::full([x.dims()[0], 1], time, &x.device());
-        Some(self.forward(x, t))
-    }
+            fn velocity(&self, x: Tensor<B, 2>, time: f64) -> Option<Tensor<B, 2>> {
+                let t = Tensor::full([x.dims()[0], 1], time, &x.device());
+                Some(self.forward(x, t))
+            }
+        }
+    )+};
 }
 
-impl<B: ModelBackend> Motion<B> for SplineVelocity<B> {
-    fn carry(&self, x: Tensor<B, 2>, from: f64, to: f64) -> Tensor<B, 2> {
-        follow(|x, t| self.forward(x, t), x, from, to)
-    }
-
-    fn velocity(&self, x: Tensor<B, 2>, time: f64) -> Option<Tensor<B, 2>> {
-        let t = Tensor::full([x.dims()[0], 1], time, &x.device());
-        Some(self.forward(x, t))
-    }
-}
+moves_points!(VelocityNet, IntervalVelocity, SplineVelocity);

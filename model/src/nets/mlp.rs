@@ -187,6 +187,12 @@ impl<B: ModelBackend> Mlp<B> {
         &self.layers[self.layers.len() - 1]
     }
 
+    /// Puts another output layer in the place of this one.
+    pub(crate) fn put_output(&mut self, output: Dense<B>) {
+        let last = self.layers.len() - 1;
+        self.layers[last] = output;
+    }
+
     /// The weight matrices between two hidden layers: not those that read the input or give the output.
     pub(crate) fn hidden_weights(&self) -> Vec<ParamId> {
         let between = self.hidden().iter().skip(1);

@@ -62,8 +62,21 @@ impl VelocityNetConfig {
     /// # Panics
     /// If `skip` is not below `depth`.
     pub fn init<B: ModelBackend>(&self, seed: u64, device: &B::Device) -> VelocityNet<B> {
+        self.init_with(3, seed, device)
+    }
+
+    /// The same with so many outputs.
+    pub(crate) fn init_with<B: ModelBackend>(
+        &self,
+        outputs: usize,
+        seed: u64,
+        device: &B::Device,
+    ) -> VelocityNet<B> {
         let rng = &mut ChaCha8Rng::seed_from_u64(seed);
-        let config = self.mlp();
+        let config = MlpConfig {
+            outputs,
+            ..self.mlp()
+        };
         let layers = match self.activation {
             Activation::Softplus { .. } => initial::he(&config, INITIAL_OUTPUT, rng),
             Activation::Sine { omega } => initial::sine(&config, omega, INITIAL_OUTPUT, rng),

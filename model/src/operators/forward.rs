@@ -17,8 +17,8 @@ use burn::tensor::{Tensor, TensorData};
 
 use super::jets::{VelocityJet, VelocityRequest};
 use crate::autodiff::{Lanes, ModelBackend};
-use crate::nets::VelocityNet;
 use crate::nets::encoding::encoding_derivatives;
+use crate::nets::{IntervalVelocity, VelocityNet};
 
 /// `V`, `J`, and what `request` names, in one sweep.
 pub fn velocity_jet<B: ModelBackend>(
@@ -27,11 +27,59 @@ pub fn velocity_jet<B: ModelBackend>(
     t: Tensor<B, 2>,
     request: VelocityRequest,
 ) -> VelocityJet<B> {
-    let n = x.dims()[0];
     let lanes = Lanes {
         tangents: 3 + usize::from(request.rate && net.time_dependent),
         laplacian: request.laplacian,
     };
+    let out = outputs(net, x, t, lanes);
+    let columns = [1, 2, 3].map(|k| column_of(out[k].clone()));
+    VelocityJet {
+        value: out[0].clone(),
+        jacobian: Tensor::cat(columns.to_vec(), 2),
+        laplacian: lanes.laplacian.then(|| out[lanes.tangents + 1].clone()),
+        rate: (lanes.tangents == 4).then(|| out[4].clone()),
+    }
+}
+
+/// `V`, `J`, and what `request` names, of a velocity whose last layer changes with time.
+///
+/// The sweep goes through the outputs of all functions of time together. They are summed up afterwards, each derivative
+/// with the same weights.
+pub fn interval_jet<B: ModelBackend>(
+    velocity: &IntervalVelocity<B>,
+    x: Tensor<B, 2>,
+    t: Tensor<B, 2>,
+    request: VelocityRequest,
+) -> VelocityJet<B> {
+    let lanes = Lanes {
+        tangents: 3,
+        laplacian: request.laplacian,
+    };
+    let out = outputs(&velocity.net, x, t.clone(), lanes);
+    let summed = |k: usize| velocity.at_time(&out[k], &t);
+    let columns = [1, 2, 3].map(|k| column_of(summed(k)));
+    VelocityJet {
+        value: summed(0),
+        jacobian: Tensor::cat(columns.to_vec(), 2),
+        laplacian: lanes.laplacian.then(|| summed(4)),
+        rate: request.rate.then(|| velocity.at_rate(&out[0], &t)),
+    }
+}
+
+/// A vector at each point as a column, `[n, 3]` to `[n, 3, 1]`.
+fn column_of<B: ModelBackend>(vectors: Tensor<B, 2>) -> Tensor<B, 3> {
+    let [n, _] = vectors.dims();
+    vectors.reshape([n, 3, 1])
+}
+
+/// The outputs of the perceptron: its values, then each lane, `[n, outputs]` each.
+fn outputs<B: ModelBackend>(
+    net: &VelocityNet<B>,
+    x: Tensor<B, 2>,
+    t: Tensor<B, 2>,
+    lanes: Lanes,
+) -> Vec<Tensor<B, 2>> {
+    let [n, _] = x.dims();
     let input = seed(net, x, t, lanes);
     let mlp = &net.mlp;
     let mut sweep = input.clone();
@@ -40,15 +88,12 @@ pub fn velocity_jet<B: ModelBackend>(
         sweep = mlp.activation().jet(z, layer.bias.val(), lanes);
     }
     let out = mlp.output().linear(sweep);
-    let block = |k: usize| out.clone().slice([k * n..(k + 1) * n, 0..3]);
-    let columns = [1, 2, 3].map(|k| block(k).reshape([n, 3, 1]));
+    let [rows, columns] = out.dims();
+    let blocks = (0..rows / n).map(|k| out.clone().slice([k * n..(k + 1) * n, 0..columns]));
+    let mut blocks: Vec<_> = blocks.collect();
     // The output layer is affine: its bias moves the value and no derivative.
-    VelocityJet {
-        value: block(0) + mlp.output().bias.val(),
-        jacobian: Tensor::cat(columns.to_vec(), 2),
-        laplacian: lanes.laplacian.then(|| block(lanes.tangents + 1)),
-        rate: (lanes.tangents == 4).then(|| block(4)),
-    }
+    blocks[0] = blocks[0].clone() + mlp.output().bias.val();
+    blocks
 }
 
 /// The input, its own tangents and Laplacian, stacked.

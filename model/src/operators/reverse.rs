@@ -13,7 +13,7 @@ use burn::tensor::Tensor;
 use super::jets::ImplicitJet;
 use crate::autodiff::ModelBackend;
 use crate::nets::encoding::encoding_derivatives;
-use crate::nets::{ImplicitNet, Mlp, VelocityNet};
+use crate::nets::{ImplicitNet, IntervalVelocity, Mlp, VelocityNet};
 
 /// `f`, `grad f`, `f_t`.
 pub fn implicit_jet<B: ModelBackend>(
@@ -52,6 +52,20 @@ pub fn pulled_back<B: ModelBackend>(
 ) -> (Tensor<B, 2>, Tensor<B, 2>) {
     let (value, g) = value_and_pullback(&net.mlp, net.features(x.clone(), t), w);
     (value, through_encoding(x, g, net.frequencies))
+}
+
+/// `V` and `J^T w` of a velocity whose last layer changes with time.
+pub fn interval_pulled_back<B: ModelBackend>(
+    velocity: &IntervalVelocity<B>,
+    x: Tensor<B, 2>,
+    t: Tensor<B, 2>,
+    w: Tensor<B, 2>,
+) -> (Tensor<B, 2>, Tensor<B, 2>) {
+    let net = &velocity.net;
+    let (input, direction) = (net.features(x.clone(), t.clone()), velocity.spread(&w, &t));
+    let (outputs, g) = value_and_pullback(&net.mlp, input, direction);
+    let gradient = through_encoding(x, g, net.frequencies);
+    (velocity.at_time(&outputs, &t), gradient)
 }
 
 /// The output, and the gradient of `<w, output>` by the perceptron's input, `[n, inputs]`.

@@ -1,10 +1,10 @@
-//! All that may be `V`: a network, or a spline.
+//! All that may be `V`: a network, its part between two of many key frames, or a spline.
 
 use burn::tensor::Tensor;
 
 use super::{Derivatives, VelocityJet, VelocityRequest, forward, nested, reverse};
 use crate::autodiff::ModelBackend;
-use crate::nets::VelocityNet;
+use crate::nets::{IntervalVelocity, VelocityNet};
 
 /// A velocity field `V(x, t)` with its derivatives by the inputs.
 ///
@@ -68,5 +68,32 @@ impl<B: ModelBackend> VelocityField<B> for VelocityNet<B> {
             Derivatives::Nested => nested::pulled_back(self, x, t, w),
             Derivatives::Forward => reverse::pulled_back(self, x, t, w),
         }
+    }
+}
+
+/// Both ways of differentiating come to the sweeps: nesting would repeat what only the last layer adds.
+impl<B: ModelBackend> VelocityField<B> for IntervalVelocity<B> {
+    fn forward(&self, x: Tensor<B, 2>, t: Tensor<B, 2>) -> Tensor<B, 2> {
+        self.forward(x, t)
+    }
+
+    fn jet(
+        &self,
+        _: Derivatives,
+        x: Tensor<B, 2>,
+        t: Tensor<B, 2>,
+        request: VelocityRequest,
+    ) -> VelocityJet<B> {
+        forward::interval_jet(self, x, t, request)
+    }
+
+    fn pulled_back(
+        &self,
+        _: Derivatives,
+        x: Tensor<B, 2>,
+        t: Tensor<B, 2>,
+        w: Tensor<B, 2>,
+    ) -> (Tensor<B, 2>, Tensor<B, 2>) {
+        reverse::interval_pulled_back(self, x, t, w)
     }
 }

@@ -88,7 +88,8 @@ fn networks_learn_the_whole_shape_with_points_where_it_is_not_seen() {
     let mut network = Recipe::between("a.ply", "b.ply").expect("two files");
     network.with("preset=quick").expect("a recipe");
     let guidance = guide(&network, &keyframes).expect("a field");
-    let [source, target] = guidance.completed;
+    let completed: [_; 2] = guidance.completed.try_into().expect("one for each");
+    let [source, target] = completed;
     assert_eq!(source, None);
     let (whole, given) = (target.expect("it is cut"), &keyframes.keys[1].cloud);
     let count = given.points.len();
@@ -176,4 +177,52 @@ fn networks_learn_a_sheet_with_its_thickness_on_both_sides_and_around_its_rim() 
         let rim = normals.len() - upright;
         assert!(rim > 0 && rim < normals.len() / 10, "{rim}");
     }
+}
+
+#[test]
+fn a_key_frame_in_the_middle_is_completed_once_from_a_neighbour_that_is_whole() {
+    let ball = bumpy_sphere(48);
+    let at = |by: f64| ball.moved(|[x, y, z]| [x + by, y, z]);
+    let normals = ball.vertex_normals();
+    let seen: Vec<usize> = (0..ball.vertices.len())
+        .filter(|k| ball.vertices[*k][2] < SEEN)
+        .collect();
+    let middle = at(0.2);
+    let cut = Shape::of(Mesh {
+        vertices: seen.iter().map(|k| middle.vertices[*k]).collect(),
+        triangles: Vec::new(),
+        normals: Some(seen.iter().map(|k| normals[*k]).collect()),
+    });
+    let pairs = |turned: bool| {
+        let pairs = seen.iter().zip(0..).map(|(k, at)| match turned {
+            false => [*k as u32, at],
+            true => [at, *k as u32],
+        });
+        CorrespondenceSource::Pairs(Correspondences {
+            pairs: pairs.collect(),
+            ..Correspondences::none()
+        })
+    };
+    let options = DataOptions {
+        times: vec![0.0, 0.5, 1.0],
+        between: vec![pairs(false), pairs(true)],
+        ..options(CorrespondenceSource::None, 4000, None)
+    };
+    let shapes = [Shape::of(at(0.0)), cut, Shape::of(at(0.4))];
+    let keyframes = prepare(&shapes, &options).expect("shapes");
+    let files = [("a.ply", 0.0), ("b.ply", 0.5), ("c.ply", 1.0)];
+    let mut recipe = Recipe::through(&files).expect("three files");
+    recipe.with("preset=quick").expect("a recipe");
+    let found = guide(&recipe, &keyframes).expect("a field").completed;
+    let known: Vec<bool> = found.iter().map(Option::is_none).collect();
+    assert_eq!(known, [true, false, true]);
+    let whole = found[1].as_ref().expect("it is cut");
+    let added = &whole.points[keyframes.keys[1].cloud.points.len()..];
+    assert!(added.len() > 300, "{}", added.len());
+    let frame = &keyframes.normalisation;
+    let truth = middle.moved(|x| frame.apply(x));
+    let search = TriangleSearch::new(&truth).expect("it has area");
+    let off = added.iter().map(|x| search.closest(*x, 0).squared.sqrt());
+    let off = mean(&off.collect::<Vec<_>>());
+    assert!(off < 0.02, "{off}");
 }

@@ -77,7 +77,9 @@ pub(super) static EFIS: MethodSpec = MethodSpec {
     // Its sines are fast: at 1e-3 the isometry term passes 1e6 within five steps (fox 0-18). At 2e-4, with fitted
     // ends, it stays below 1.
     changes: &["training.velocity-learning-rate=2e-4"],
+    takes_many: false,
     many: &[],
+    steps_of_interval: None,
 };
 
 const SHARED_OUT: &str = "the method trains one network after the other and shares its steps out \

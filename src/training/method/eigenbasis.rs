@@ -56,7 +56,9 @@ pub(super) static EIGENBASIS: MethodSpec = MethodSpec {
     fixed: &[("eigenbasis.modes", "a fitted flow cannot change its basis")],
     // Coefficients of one size each: the steps can be larger than a network's.
     changes: &["training.velocity-learning-rate=1e-2"],
+    takes_many: false,
     many: &[],
+    steps_of_interval: None,
 };
 
 section! {

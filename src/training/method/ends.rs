@@ -37,7 +37,9 @@ pub(super) static MLP: MethodSpec = MethodSpec {
     own: None,
     fixed: &[],
     changes: &SOFT,
+    takes_many: false,
     many: &[],
+    steps_of_interval: None,
 };
 
 /// `sdf-blend`.
@@ -53,7 +55,9 @@ pub(super) static SDF_BLEND: MethodSpec = MethodSpec {
     own: None,
     fixed: &[],
     changes: &SOFT,
+    takes_many: false,
     many: &[],
+    steps_of_interval: None,
 };
 
 /// `lipmlp`.
@@ -95,7 +99,9 @@ pub(super) static LIPMLP: MethodSpec = MethodSpec {
         "a trained network cannot change its input",
     )],
     changes: &["training.learning-rate=2e-3"],
+    takes_many: false,
     many: &[],
+    steps_of_interval: None,
 };
 
 section! {

@@ -5,7 +5,8 @@ use std::io;
 
 use burn::module::Module;
 use isomorph_model::flow::end_fields::{EndFields, EndFieldsConfig};
-use isomorph_model::{FlowGeometry, Geometry, TrainBackend, VelocityNet};
+use isomorph_model::operators::VelocityField;
+use isomorph_model::{FlowGeometry, Geometry, Objective, TrainBackend, VelocityNet};
 
 use super::ends::OnDevice;
 use super::spec::{Acts, Keys, MethodSpec, Needs};
@@ -49,7 +50,11 @@ pub(super) static FLOW: MethodSpec = MethodSpec {
     own: None,
     fixed: &FIXED_OPTIMISER,
     changes: &[],
-    many: &[],
+    takes_many: true,
+    // Those of splines through many key frames: the mean interval is the unit of time.
+    many: &["loss.strain=1.0", "loss.divergence=1.0", "loss.screw=10.0"],
+    // An end field between two intervals learns in the steps of both.
+    steps_of_interval: Some(2.0 / 3.0),
 };
 
 /// Whether V learns from a guide in step `step` of the recipe.
@@ -93,6 +98,91 @@ impl<B: TrainBackend> EndsAndFlow<B> {
     }
 }
 
+/// The phase of a step.
+pub(super) fn phase(schedule: &Schedule, step: usize) -> Phase {
+    if schedule.is_guided(step) {
+        return Phase::Guided;
+    }
+    // The end fields train from the first step, so that there is no warm-up of the velocity alone.
+    match schedule.phase(step) {
+        Phase::WarmUp => Phase::Ramp,
+        phase => phase,
+    }
+}
+
+/// The learning rates of a step.
+pub(super) fn rates(settings: &Settings, schedule: &Schedule, step: usize) -> Rates {
+    let training = &settings.training;
+    let (first, steps) = (training.learning_rate, training.steps);
+    Rates {
+        implicit: schedule.rate(first, step, 0, steps),
+        velocity: schedule.velocity_rate(step),
+    }
+}
+
+/// The samples of a step between two key frames.
+pub(super) fn draw(settings: &Settings, phase: Phase, data: &TrainingData, step: usize) -> Drawn {
+    let training = &settings.training;
+    let sizes = BatchSizes {
+        // The end fields have samples of their own.
+        ends: 0,
+        ..BatchSizes::new(training, data)
+    };
+    let ends = EndBatch::draw(data, training, step, settings.measures_distances());
+    if phase == Phase::Guided {
+        return Drawn {
+            guided: Guided::draw(data, training, sizes, step),
+            ends,
+            ..Drawn::default()
+        };
+    }
+    Drawn {
+        batch: Batch::draw(data, training, sizes, step),
+        ends,
+        ..Drawn::default()
+    }
+}
+
+/// What a step between two key frames is made with.
+pub(super) struct Made<'a, B: TrainBackend> {
+    pub settings: &'a Settings,
+    pub schedule: &'a Schedule,
+    pub device: &'a B::Device,
+    pub ends: &'a EndFields<B>,
+    pub v: &'a dyn VelocityField<B>,
+    /// `V` for values.
+    pub still: &'a dyn VelocityField<B::InnerBackend>,
+}
+
+impl<B: TrainBackend> Made<'_, B> {
+    /// What the step minimises.
+    pub(super) fn objective(
+        &self,
+        data: &TrainingData,
+        drawn: &Drawn,
+        step: usize,
+    ) -> Objective<B> {
+        let (settings, schedule, device) = (self.settings, self.schedule, self.device);
+        let measured = settings.measures_distances();
+        let [source, target] = OnDevice::new(data, &drawn.ends, measured, device).apart();
+        let last_scale = settings.loss.matching_scale;
+        let flow_step = FlowStep {
+            motion: Motion {
+                settings,
+                v: self.v,
+                still: self.still,
+                matching_scale: schedule.matching_scale(last_scale, step),
+                device,
+            },
+            phase: phase(schedule, step),
+            warms_up: schedule.phase(step) == Phase::WarmUp,
+            ramp: schedule.ramp(step),
+            ends: self.ends,
+        };
+        flow_step.objective(&drawn.batch, &drawn.guided, [&source, &target])
+    }
+}
+
 impl<B: TrainBackend> EndsAndFlow<B> {
     /// The end fields as the flow carries them.
     fn carried(&self) -> FlowGeometry<B::InnerBackend> {
@@ -103,23 +193,11 @@ impl<B: TrainBackend> EndsAndFlow<B> {
 
 impl<B: TrainBackend> Method<B> for EndsAndFlow<B> {
     fn phase(&self, step: usize) -> Phase {
-        if self.schedule.is_guided(step) {
-            return Phase::Guided;
-        }
-        // The end fields train from the first step, so that there is no warm-up of the velocity alone.
-        match self.schedule.phase(step) {
-            Phase::WarmUp => Phase::Ramp,
-            phase => phase,
-        }
+        phase(&self.schedule, step)
     }
 
     fn rates(&self, step: usize) -> Rates {
-        let training = &self.settings.training;
-        let (first, steps) = (training.learning_rate, training.steps);
-        Rates {
-            implicit: self.schedule.rate(first, step, 0, steps),
-            velocity: self.schedule.velocity_rate(step),
-        }
+        rates(&self.settings, &self.schedule, step)
     }
 
     fn parts(&self) -> usize {
@@ -127,49 +205,21 @@ impl<B: TrainBackend> Method<B> for EndsAndFlow<B> {
     }
 
     fn draw(&self, data: &TrainingData, step: usize) -> Drawn {
-        let training = &self.settings.training;
-        let sizes = BatchSizes {
-            // The end fields have samples of their own.
-            ends: 0,
-            ..BatchSizes::new(training, data)
-        };
-        let measured = self.settings.measures_distances();
-        let ends = EndBatch::draw(data, training, step, measured);
-        if self.phase(step) == Phase::Guided {
-            return Drawn {
-                guided: Guided::draw(data, training, sizes, step),
-                ends,
-                ..Drawn::default()
-            };
-        }
-        Drawn {
-            batch: Batch::draw(data, training, sizes, step),
-            ends,
-            ..Drawn::default()
-        }
+        draw(&self.settings, self.phase(step), data, step)
     }
 
     fn objective(&self, data: &TrainingData, drawn: &Drawn, step: usize) -> Posed<B> {
-        let (settings, device) = (&self.settings, &self.device);
-        let measured = settings.measures_distances();
-        let [source, target] = OnDevice::new(data, &drawn.ends, measured, device).apart();
         let (ends, v) = (self.ends.replica(), self.velocity.replica());
-        let last_scale = settings.loss.matching_scale;
-        let flow_step = FlowStep {
-            motion: Motion {
-                settings,
-                v: &v,
-                matching_scale: self.schedule.matching_scale(last_scale, step),
-                device,
-            },
-            phase: self.phase(step),
-            warms_up: self.schedule.phase(step) == Phase::WarmUp,
-            ramp: self.schedule.ramp(step),
+        let still = self.velocity.valid();
+        let made = Made {
+            settings: &self.settings,
+            schedule: &self.schedule,
+            device: &self.device,
             ends: &ends,
+            v: &v,
+            still: &still,
         };
-        Posed::new(flow_step.objective(&drawn.batch, &drawn.guided, [&source, &target]))
-            .by(ends)
-            .by(v)
+        Posed::new(made.objective(data, drawn, step)).by(ends).by(v)
     }
 
     fn descend(&mut self, step: usize, slopes: &mut Slopes) {
@@ -220,7 +270,7 @@ impl<B: TrainBackend> Method<B> for EndsAndFlow<B> {
 }
 
 /// The middles of equal cells of a box.
-fn lattice(bounds: &Bounds) -> Vec<[f32; 3]> {
+pub(super) fn lattice(bounds: &Bounds) -> Vec<[f32; 3]> {
     let at = |axis: usize, k: usize| {
         let (low, high) = (bounds.min[axis], bounds.max[axis]);
         low + (high - low) * (k as f32 + 0.5) / PROBES as f32

@@ -3,6 +3,7 @@
 //! | file | methods (`method.name` in the recipe) |
 //! |---|---|
 //! | `flow.rs` | `velocity-field` with `implicit.geometry = "flow"`: the default |
+//! | `sequence.rs` | the same through more than two key frames |
 //! | `network.rs` | `velocity-field` with `implicit.geometry = "network"`: the paper's |
 //! | `ends.rs` | `mlp`, `sdf-blend`, `lipmlp`: fitted at t = 0 and t = 1 only |
 //! | `spline.rs` | `velocity-field` with `velocity.kind = "spline"`: solved for, not trained |
@@ -23,6 +24,7 @@ mod flow;
 mod network;
 mod nfgp;
 mod nise;
+mod sequence;
 pub(crate) mod spec;
 pub mod spline;
 
@@ -30,7 +32,7 @@ use std::io;
 
 use burn::module::{AutodiffModule, ParamId};
 use burn::optim::GradientsParams;
-use isomorph_model::{Geometry, Motion, TrainBackend};
+use isomorph_model::{Geometry, ModelBackend, Motion, TrainBackend};
 
 use crate::data::{Bounds, TrainingData};
 use crate::optimiser::Optimiser;
@@ -61,6 +63,9 @@ macro_rules! methods {
             device: &B::Device,
         ) -> Option<Box<dyn Method<B>>> {
             let chosen = spec_of(recipe);
+            if *chosen == flow::FLOW && recipe.data.keyframes.len() > 2 {
+                return Some(Box::new(sequence::EndsThroughKeys::<B>::new(recipe, bounds, device)));
+            }
             $( if *chosen == $o::$OWN {
                 return Some(Box::new($o::$Own::<B>::new(recipe, bounds, device)));
             } )+
@@ -192,7 +197,24 @@ pub trait Method<B: TrainBackend>: Sync {
 
     /// The motion as it stands, if the method has one.
     fn motion(&self) -> Option<Box<dyn Motion<B::InnerBackend>>>;
+
+    /// Surface and motion from each key frame to the next, where there are more than two: these stand in for the other
+    /// two.
+    fn through(&self) -> Option<Through<B::InnerBackend>> {
+        None
+    }
 }
+
+/// Surface and motion from each key frame to the next, over a time from 0 to 1.
+pub struct Through<B: ModelBackend> {
+    /// The times of the key frames, 0 to 1.
+    pub times: Vec<f64>,
+    /// Those from the key frame of this number on.
+    pub part: Box<PartOf<B>>,
+}
+
+/// Gives what there is from a key frame to the next.
+pub type PartOf<B> = dyn Fn(usize) -> (Box<dyn Geometry<B>>, Box<dyn Motion<B>>) + Send + Sync;
 
 /// Whether the data has what the recipe's method needs.
 ///
@@ -242,7 +264,7 @@ const FIXED_OPTIMISER: [(&str, &str); 1] = [(
 /// A network with the optimiser that moves it, under the name of its files.
 pub(super) struct Trainee<B: TrainBackend, M: AutodiffModule<B>> {
     /// `NAME.mpk` and `NAME-optimiser.mpk` in a checkpoint, and with Muon `NAME-muon-optimiser.mpk`.
-    name: &'static str,
+    name: String,
     /// The network.
     pub net: M,
     optimiser: Optimiser<B, M>,
@@ -251,9 +273,9 @@ pub(super) struct Trainee<B: TrainBackend, M: AutodiffModule<B>> {
 
 impl<B: TrainBackend, M: AutodiffModule<B>> Trainee<B, M> {
     /// A network before its first step, which Adam moves.
-    pub(crate) fn new(name: &'static str, net: M, device: &B::Device) -> Self {
+    pub(crate) fn new(name: &str, net: M, device: &B::Device) -> Self {
         Self {
-            name,
+            name: name.to_owned(),
             net,
             optimiser: Optimiser::adam(),
             device: device.clone(),
@@ -263,7 +285,7 @@ impl<B: TrainBackend, M: AutodiffModule<B>> Trainee<B, M> {
     /// A network of `f` before its first step, with the optimiser of the recipe and its rates for `f`.
     /// Muon moves the matrices `hidden`.
     fn of_field(
-        name: &'static str,
+        name: &str,
         net: M,
         hidden: Vec<ParamId>,
         training: &TrainingRecipe,
@@ -275,7 +297,7 @@ impl<B: TrainBackend, M: AutodiffModule<B>> Trainee<B, M> {
 
     /// The same of what moves points.
     fn of_motion(
-        name: &'static str,
+        name: &str,
         net: M,
         hidden: Vec<ParamId>,
         training: &TrainingRecipe,
@@ -319,13 +341,13 @@ impl<B: TrainBackend, M: AutodiffModule<B>> Trainee<B, M> {
     /// Adds the records of network and optimiser.
     pub(crate) fn record(&self, records: &mut Records) -> io::Result<()> {
         records.push::<B>(self.file(), self.net.clone().into_record())?;
-        self.optimiser.record(self.name, records)
+        self.optimiser.record(&self.name, records)
     }
 
     /// Takes both from records.
     pub(crate) fn restore(&mut self, records: &Records) -> Result<(), RecordError> {
         let net = records.get::<B, M::Record>(&self.file(), &self.device)?;
-        self.optimiser.restore(self.name, records, &self.device)?;
+        self.optimiser.restore(&self.name, records, &self.device)?;
         self.net = self.net.clone().load_record(net);
         Ok(())
     }

@@ -40,7 +40,9 @@ pub(super) static NETWORK: MethodSpec = MethodSpec {
     own: None,
     fixed: &FIXED_OPTIMISER,
     changes: &[],
+    takes_many: false,
     many: &[],
+    steps_of_interval: None,
 };
 
 /// The two networks and how they are trained.
@@ -98,11 +100,13 @@ impl<B: TrainBackend> Method<B> for VelocityField<B> {
 
     fn objective(&self, _: &TrainingData, drawn: &Drawn, step: usize) -> Posed<B> {
         let (f, v) = (self.implicit.replica(), self.velocity.replica());
+        let still = self.velocity.valid();
         let last_scale = self.settings.loss.matching_scale;
         let network_step = Step {
             motion: Motion {
                 settings: &self.settings,
                 v: &v,
+                still: &still,
                 matching_scale: self.schedule.matching_scale(last_scale, step),
                 device: &self.device,
             },

@@ -63,7 +63,9 @@ pub(super) static NFGP: MethodSpec = MethodSpec {
     ],
     // Its normalised layers learn slowly.
     changes: &["training.velocity-learning-rate=3e-3"],
+    takes_many: false,
     many: &[],
+    steps_of_interval: None,
 };
 
 const SHARED_OUT: &str = "the method trains one deformation after the other and shares its steps out \

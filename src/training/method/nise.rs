@@ -41,7 +41,9 @@ pub(super) static NISE: MethodSpec = MethodSpec {
     own: Some(NiseKeys::SECTION),
     fixed: &FIXED,
     changes: &CHANGES,
+    takes_many: false,
     many: &[],
+    steps_of_interval: None,
 };
 
 /// `nise-velocity`.
@@ -57,7 +59,9 @@ pub(super) static NISE_VELOCITY: MethodSpec = MethodSpec {
     own: Some(NiseKeys::SECTION),
     fixed: &FIXED,
     changes: &CHANGES,
+    takes_many: false,
     many: &[],
+    steps_of_interval: None,
 };
 
 section! {

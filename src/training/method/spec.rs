@@ -28,8 +28,13 @@ pub struct MethodSpec {
     pub(crate) fixed: &'static [(&'static str, &'static str)],
     /// What a comparison changes for it in the preset `quick`, beside the method itself.
     pub(crate) changes: &'static [&'static str],
+    /// Whether it takes more than two key frames.
+    pub(crate) takes_many: bool,
     /// Values that keys have in every preset where there are more than two key frames.
     pub(crate) many: &'static [&'static str],
+    /// The steps of each interval where there are more than two key frames, as a share of those that the preset has for
+    /// two, if their number grows with that of the intervals.
+    pub(crate) steps_of_interval: Option<f64>,
 }
 
 /// What a method cannot do without.

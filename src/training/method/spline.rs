@@ -50,6 +50,7 @@ pub(super) static SPLINE: MethodSpec = MethodSpec {
     // Presets of networks have far more steps.
     changes: &["training.steps=18"],
     // The mean interval is the unit of time of these weights.
+    takes_many: true,
     many: &[
         "loss.strain=1.0",
         "loss.divergence=1.0",
@@ -61,6 +62,7 @@ pub(super) static SPLINE: MethodSpec = MethodSpec {
         "spline.coarse-shares=[0.5]",
         "spline.band=4000",
     ],
+    steps_of_interval: None,
 };
 
 section! {

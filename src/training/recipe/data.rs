@@ -66,6 +66,16 @@ impl DataRecipe {
         &self.keyframes[0].file
     }
 
+    /// The times of the key frames, brought to 0 to 1.
+    pub fn unit_times(&self) -> Vec<f64> {
+        let times = self.keyframes.iter().map(|key| key.time);
+        let (first, last) = (
+            self.keyframes[0].time,
+            self.keyframes[self.keyframes.len() - 1].time,
+        );
+        times.map(|time| (time - first) / (last - first)).collect()
+    }
+
     /// The file of the last key frame.
     pub fn target(&self) -> &Path {
         &self.keyframes[self.keyframes.len() - 1].file

@@ -109,11 +109,23 @@ pub enum RecipeError {
         /// What is wrong, and what to do.
         problem: String,
     },
-    /// Key frames that can be written, but not yet trained on.
+    /// More key frames than the method takes.
     #[error(
-        "{at}: networks are trained on two key frames, not {keys}; for more, set preset = \"instant\""
+        "{at}: {method} takes two key frames, not {keys}; for more, set preset = \"instant\", \"quick\" or \"default\""
     )]
     ManyKeyFrames {
+        /// File and line, or override.
+        at: String,
+        /// How many there are.
+        keys: usize,
+        /// The method.
+        method: String,
+    },
+    /// More than two key frames, and one velocity for all times.
+    #[error(
+        "{at}: no velocity that stays the same leads through {keys} key frames; leave velocity.time-dependent at true"
+    )]
+    Stationary {
         /// File and line, or override.
         at: String,
         /// How many there are.

@@ -110,13 +110,6 @@ fn of_sequence(
     known: Correspondences,
 ) -> Result<Frames, RecipeError> {
     let file = text(entries.get("data.sequence"), data("sequence"), origin)?;
-    if let (Correspondences::File(_), Some(entry)) = (&known, entries.get("data.correspondences")) {
-        return Err(RecipeError::Refused {
-            at: entry.about(),
-            allowed: "\"none\", \"same-vertices\" or \"match\" where a sequence is given"
-                .to_owned(),
-        });
-    }
     let many = files::stands_for_many(&file);
     let entry = entries.get("data.keys");
     if entry.is_none() && many {

@@ -136,10 +136,19 @@ impl Recipe {
     /// Whether its method can be trained on so many key frames; `at`: where they are named.
     fn trainable(&self, at: impl FnOnce() -> String) -> Result<(), RecipeError> {
         let keys = self.data.keyframes.len();
-        if keys == 2 || is_solved(self) {
-            return Ok(());
+        let spec = spec_of(self);
+        if keys > 2 && !spec.takes_many {
+            let method = spec.described();
+            return Err(RecipeError::ManyKeyFrames {
+                at: at(),
+                keys,
+                method,
+            });
         }
-        Err(RecipeError::ManyKeyFrames { at: at(), keys })
+        if keys > 2 && !is_solved(self) && !self.velocity.time_dependent {
+            return Err(RecipeError::Stationary { at: at(), keys });
+        }
+        Ok(())
     }
 
     /// Everything that the recipe says. What has the preset's value is the preset's, so that another preset

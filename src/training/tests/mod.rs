@@ -5,8 +5,10 @@ mod guided;
 mod methods;
 mod optimiser;
 mod samples;
+mod sequence;
 
 use std::path::Path;
+use std::sync::Arc;
 
 use burn::optim::GradientsParams;
 use burn_autodiff::Autodiff;
@@ -26,27 +28,29 @@ type B = Autodiff<NdArray>;
 const FLOW: &str = "implicit.geometry=flow";
 const NETWORK: &str = "implicit.geometry=network";
 
+/// What makes a recipe small.
+const SMALL: [&str; 15] = [
+    "data.correspondences=same-vertices",
+    "implicit.activation=softplus",
+    "implicit.beta=100",
+    "training.velocity-until=0.7",
+    "training.integrator=midpoint",
+    "training.time-steps=3",
+    "implicit.depth=2",
+    "implicit.width=8",
+    "velocity.depth=2",
+    "velocity.width=8",
+    "training.batch=88",
+    "training.correspondence-batch=8",
+    "training.steps=10",
+    "training.optimiser=adam",
+    "training.guided-until=0",
+];
+
 /// A small recipe with these changes; what of it does nothing in the changed method is dropped.
 fn recipe(extra: &[&str]) -> Recipe {
     let text = "preset = \"quick\"\n[data]\nsource = \"a.ply\"\ntarget = \"b.ply\"\n";
-    let small = [
-        "data.correspondences=same-vertices",
-        "implicit.activation=softplus",
-        "implicit.beta=100",
-        "training.velocity-until=0.7",
-        "training.integrator=midpoint",
-        "training.time-steps=3",
-        "implicit.depth=2",
-        "implicit.width=8",
-        "velocity.depth=2",
-        "velocity.width=8",
-        "training.batch=88",
-        "training.correspondence-batch=8",
-        "training.steps=10",
-        "training.optimiser=adam",
-        "training.guided-until=0",
-    ];
-    let small = small.map(str::to_owned);
+    let small = SMALL.map(str::to_owned);
     let mut recipe = Recipe::parse(text, Path::new("recipe.toml"), &small).expect("a recipe");
     let extra: Vec<String> = extra.iter().map(|text| (*text).to_owned()).collect();
     recipe.with_all(&extra).expect("changes of it");
@@ -86,10 +90,9 @@ fn recipe_of(spec: &MethodSpec, extra: &[&str]) -> Recipe {
 
 /// Points of two spheres, the second moved along x, with a guide.
 fn data() -> TrainingData {
-    TrainingData {
-        guide: Some(Box::new(guided::Turning)),
-        ..TrainingData::spheres(200, 200)
-    }
+    let mut data = TrainingData::spheres(200, 200);
+    data.guide = Some(Arc::new(guided::Turning));
+    data
 }
 
 fn build(recipe: &Recipe, data: &TrainingData) -> Box<dyn Method<B>> {

@@ -1,6 +1,7 @@
 //! Samples, their streams, and the parts into which they are divided.
 
 use std::num::NonZeroUsize;
+use std::sync::Arc;
 
 use burn::module::ParamId;
 
@@ -227,10 +228,10 @@ fn half_of_the_samples_of_the_box_lie_in_a_hollow_where_distances_are_measured()
     let mut data = data();
     // Those of the band are near the points, far from the hollow.
     for key in &mut data.keys {
-        key.points = vec![[5.0, 0.0, 0.0]; 10];
-        key.normals = Some(vec![[1.0, 0.0, 0.0]; 10]);
+        key.points = vec![[5.0, 0.0, 0.0]; 10].into();
+        key.normals = Some(vec![[1.0, 0.0, 0.0]; 10].into());
     }
-    data.keys[1].around = Box::new(Hollow);
+    data.keys[1].around = Arc::new(Hollow);
     let recipe = recipe(&["training.batch=2200", "training.band-share=0.75"]);
     let share = |measured: bool| {
         let drawn = EndBatch::draw(&data, &recipe.training, 7, measured);

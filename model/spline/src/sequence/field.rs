@@ -115,14 +115,7 @@ impl<R: Real> SequenceField<R> {
 
     /// The functions that act from key frame `s` to the next, in a time from 0 to 1 there.
     fn basis(&self, s: usize) -> TimeBasis {
-        // The first and the last interval are repeated beyond the ends.
-        let last = self.times.len() - 2;
-        let of = |s: usize| length(&self.times, s);
-        let (before, h, after) = (of(s.saturating_sub(1)), of(s), of((s + 1).min(last)));
-        // De Boor's recursion.
-        let (a, b) = (h / (before + h), h / (h + after));
-        let functions = [[a, -2.0 * a, a], [1.0 - a, 2.0 * a, -a - b], [0.0, 0.0, b]];
-        TimeBasis::Quadratic(functions.map(|function| function.map(|x| x * h)))
+        TimeBasis::Quadratic(quadratics(&self.times, s))
     }
 
     /// The same field on a grid of half the spacing.
@@ -135,6 +128,22 @@ impl<R: Real> SequenceField<R> {
         refine(&self.grid, &self.nodes, entries, &finer, &mut out.nodes);
         Ok(out)
     }
+}
+
+/// The three quadratic B-splines in time that act from key frame `s` to the next, each as `a + b u + c u^2` in a time
+/// `u` from 0 to 1 there, times the length of that interval, where the mean of all is 1. Their breaks are the times.
+///
+/// # Panics
+/// If there is no such interval.
+pub fn quadratics(times: &[f64], s: usize) -> [[f64; 3]; ACTING] {
+    // The first and the last interval are repeated beyond the ends.
+    let last = times.len() - 2;
+    let of = |s: usize| length(times, s);
+    let (before, h, after) = (of(s.saturating_sub(1)), of(s), of((s + 1).min(last)));
+    // De Boor's recursion.
+    let (a, b) = (h / (before + h), h / (h + after));
+    let functions = [[a, -2.0 * a, a], [1.0 - a, 2.0 * a, -a - b], [0.0, 0.0, b]];
+    functions.map(|function| function.map(|x| x * h))
 }
 
 impl<R: Real> OnGrid<R> for SequenceField<R> {

@@ -31,7 +31,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-pub use self::field::SequenceField;
+pub use self::field::{SequenceField, quadratics};
 use self::system::SequenceSystem;
 use crate::band::by_cell;
 use crate::cell::{add_change, are_finite};

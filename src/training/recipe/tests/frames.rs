@@ -90,11 +90,52 @@ fn a_sequence_has_the_frames_that_are_its_key_frames() {
 }
 
 #[test]
-fn training_on_them_is_refused_in_one_place() {
-    let refused =
-        "networks are trained on two key frames, not 3; for more, set preset = \"instant\"";
-    assert_eq!(message(THREE), format!("recipe.toml:6: {refused}"));
-    assert_eq!(message(SEQUENCE), format!("recipe.toml:2: {refused}"));
+fn methods_that_take_two_refuse_more_in_one_place() {
+    let presets = "for more, set preset = \"instant\", \"quick\" or \"default\"";
+    let refused = format!(
+        "velocity-field with implicit.geometry = \"network\" takes two key frames, not 3; {presets}"
+    );
+    let paper = |text: &str| message(&format!("preset = \"paper\"\n{text}"));
+    assert_eq!(paper(THREE), format!("recipe.toml:7: {refused}"));
+    assert_eq!(paper(SEQUENCE), format!("recipe.toml:3: {refused}"));
+    let baseline = parsed(SEQUENCE, &["method.name=mlp"]);
+    let told = baseline.expect_err("refused").to_string();
+    assert!(told.contains("mlp takes two key frames, not 3"), "{told}");
+    let still = parsed(SEQUENCE, &["velocity.time-dependent=false"]);
+    let told = still.expect_err("refused").to_string();
+    assert!(told.contains("through 3 key frames"), "{told}");
+    assert!(
+        told.contains("leave velocity.time-dependent at true"),
+        "{told}"
+    );
+}
+
+#[test]
+fn the_steps_of_networks_grow_with_the_number_of_intervals() {
+    let steps = |preset: &str, keys: &str| {
+        let text = format!(
+            "preset = \"{preset}\"\n{}",
+            SEQUENCE.replace("[0, 10, 18]", keys)
+        );
+        parsed(&text, &[]).expect("a recipe").training.steps
+    };
+    let two = steps("quick", "[0, 10]");
+    // An end field between two intervals learns in both: two thirds of the steps of a pair for each.
+    assert_eq!(
+        steps("quick", "[0, 1, 2]"),
+        (two as f64 * 4.0 / 3.0).round() as usize
+    );
+    assert_eq!(steps("quick", "[0, 10, 18, 28, 39, 47, 54]"), 4 * two);
+    let [one, seven] = ["[0, 1]", "[0, 1, 2, 3, 4, 5, 6]"].map(|keys| steps("default", keys));
+    assert_eq!(seven, 4 * one);
+    assert_eq!(
+        steps("instant", "[0, 1, 2]"),
+        steps("instant", "[0, 1, 2, 3]")
+    );
+    // A number of one's own stays.
+    let own = parsed(SEQUENCE, &["training.steps=77"]).expect("a recipe");
+    assert_eq!(own.training.steps, 77);
+    assert_eq!(read(&own.to_toml()).expect("its own print"), own);
 }
 
 #[test]
@@ -145,11 +186,6 @@ fn each_mistake_says_where_it_is_and_what_to_do() {
             SEQUENCE.replace("keys = [0, 10, 18]", ""),
             "recipe.toml: data.keys is missing (a list of numbers, each from 0 to 10000000); add it \
              under [data]",
-        ),
-        (
-            SEQUENCE.replace("same-vertices", "/pairs.csv"),
-            "recipe.toml:4: data.correspondences = \"/pairs.csv\": must be \"none\", \"same-vertices\" or \
-             \"match\" where a sequence is given",
         ),
         (
             "data.keyframe = 3\n".to_owned(),
@@ -211,11 +247,6 @@ fn a_folder_or_a_pattern_is_a_sequence_in_the_order_of_its_numbers() {
         ),
         ("[.ply", "", "Pattern syntax error"),
         ("**/*.ply", "", "there are 0 shapes in this place"),
-        (
-            "*.ply",
-            "correspondences = \"/pairs.csv\"\n",
-            "where a sequence is given",
-        ),
     ] {
         let refused = of(sequence, rest).expect_err(told).to_string();
         assert!(refused.contains(told), "{refused}");
