@@ -1,12 +1,16 @@
 #!/usr/bin/env python3
 """Measures motions through many key frames: the key frames that the authors of the paper name.
 
-    python3 scripts/keys.py [--binary PATH] [--sequences DIR] [--seeds N] [--out DIR] [--work DIR] [--table]
+    python3 scripts/keys.py [--binary PATH] [--sequences DIR] [--seeds N] [--out DIR] [--work DIR]
+        [--networks | --table]
 
 Frames 0, 10, 18, 28, 39, 47 and 54 of each sequence are given, with 1000 points that are known at
 all of them; all other frames are ground truth. `one field` is the preset `instant` through all key
 frames, `pairs` the same preset on each two neighbours by themselves. Then 14 key frames: with known
 points, and as clouds that are sampled anew at each key frame, with pairs found by `match` or none.
+
+With --networks the preset `default` is trained through the seven key frames instead, which takes about
+five minutes for each sequence and seed. Its rows are put beside those that are in DIR/keys already.
 
 The results go to DIR/keys: table.md, figure.svg, and data.json with all numbers, command, date,
 machine and version. What is in the work folder is not measured again. All of it takes about half an
@@ -42,7 +46,7 @@ MANY_KEYS = (0, 4, 8, 12, 17, 21, 25, 29, 33, 37, 42, 46, 50, 54)
 MANY = ("human_raise_arms",)
 POINTS = 20_000
 
-ONE, PAIRS = "one field", "pairs"
+ONE, PAIRS, NETWORKS = "one field", "pairs", "networks (`default`)"
 KNOWN, FOUND, NONE = "14 keys", "14 keys, clouds, match", "14 keys, clouds, no pairs"
 
 # What is kept of what `evaluate` says: kind, metric.
@@ -64,6 +68,7 @@ def arguments(words: list[str]) -> argparse.Namespace:
     add("--seeds", type=int, default=3, help="runs of one field on each sequence (default: 3)")
     add("--samples", type=int, default=100_000, help="points on each surface (default: 100000)")
     add("--out", type=Path, default=ROOT / "scripts/results", help="where results go")
+    add("--networks", action="store_true", help="measure the preset default, and keep the other rows")
     command_line.add_table(parser)
     options = parser.parse_args(words)
     if not 1 <= options.seeds <= 100:
@@ -76,8 +81,12 @@ def main(words: list[str]) -> int:
     folder = options.out / "keys"
     try:
         figures.check()
-        if not options.table:
-            content = measured(options, shlex.join(["scripts/keys.py", *words]))
+        command = shlex.join(["scripts/keys.py", *words])
+        if options.networks:
+            content = with_networks(compact.read(folder / compact.NAME), options, command)
+            compact.write(folder / compact.NAME, content)
+        elif not options.table:
+            content = measured(options, command)
             compact.write(folder / compact.NAME, content)
         content = compact.read(folder / compact.NAME)
     except PaperError as error:
@@ -116,6 +125,17 @@ def measured(options: argparse.Namespace, command: str) -> dict:
     }
 
 
+def with_networks(content: dict, options: argparse.Namespace, command: str) -> dict:
+    """The same with rows of networks, and how these were measured."""
+    place = command_line.sequences(options)
+    rows = [found for found in content["rows"] if found["variant"] != NETWORKS]
+    for name in SEQUENCES:
+        bench = Bench(options, read_sequence(place / f"{name}.anime"))
+        for seed in range(options.seeds):
+            rows.append(row(name, NETWORKS, seed, [bench.run(KEYS, seed, preset="default")]))
+    return {**content, "rows": rows, "networks": record.of(command, options.binary)}
+
+
 class Bench:
     """Trains and measures on one sequence."""
 
@@ -124,16 +144,17 @@ class Bench:
         self.sequence = sequence
         self.work = options.work / "keys" / sequence.name
 
-    def run(self, keys: tuple[int, ...], seed: int, pairs: str | None = None) -> dict:
+    def run(self, keys: tuple[int, ...], seed: int, pairs: str | None = None, preset: str = "instant") -> dict:
         """What `evaluate` says of a run through key frames, with the seconds of its training. pairs: of clouds that are
         sampled anew; none for the true vertices.
         """
-        folder = self.work / "-".join([f"{len(keys)}-{keys[0]}-{keys[-1]}", f"seed-{seed}", pairs or "known"])
+        names = [f"{len(keys)}-{keys[0]}-{keys[-1]}", f"seed-{seed}", pairs or "known"]
+        folder = self.work / "-".join(names if preset == "instant" else [*names, preset])
         done = folder / "measured.json"
         if done.exists():
             return json.loads(done.read_text("utf-8"))
         recipe = folder / "recipe.toml"
-        write_atomically(recipe, self.recipe(keys, pairs, folder).encode())
+        write_atomically(recipe, self.recipe(keys, pairs, folder, preset).encode())
         run = folder / "run"
         binary = self.options.binary
         output([binary, "train", str(recipe), "--run", str(run), "--force", "--quiet", "--set",
@@ -145,14 +166,14 @@ class Bench:
         write_atomically(done, json.dumps(found).encode())
         return found
 
-    def recipe(self, keys: tuple[int, ...], pairs: str | None, folder: Path) -> str:
+    def recipe(self, keys: tuple[int, ...], pairs: str | None, folder: Path, preset: str) -> str:
         if pairs is None:
             text = f'sequence = "{self.sequence.path.resolve()}"\nkeys = {list(keys)}\n'
-            return f'preset = "instant"\n[data]\n{text}correspondences = "same-vertices"\n'
+            return f'preset = "{preset}"\n[data]\n{text}correspondences = "same-vertices"\n'
         for key in keys:
             write_cloud(folder / f"{key}.ply", *self.sampled(key))
         listed = ", ".join(f'{{ file = "{key}.ply", time = {key} }}' for key in keys)
-        return f'preset = "instant"\n[data]\ncorrespondences = "{pairs}"\nkeyframe = [{listed}]\n'
+        return f'preset = "{preset}"\n[data]\ncorrespondences = "{pairs}"\nkeyframe = [{listed}]\n'
 
     def sampled(self, frame: int) -> tuple[np.ndarray, np.ndarray]:
         """Points uniform over the area of a frame, by random numbers of its own, with normals of the triangles."""
@@ -197,6 +218,11 @@ def mean(rows: list[dict], column: str) -> float:
 
 def markdown(content: dict) -> str:
     """The table for people."""
+    made = [record.made_by(content)]
+    labels = [ONE, PAIRS]
+    if networks := content.get("networks"):
+        labels.append(NETWORKS)
+        made.append(f"Networks: {record.made_by({**content, **networks})}")
     keys = ", ".join(map(str, content["settings"]["keys"]))
     lines = [
         "# Motions through many key frames",
@@ -206,7 +232,7 @@ def markdown(content: dict) -> str:
         " surfaces, means over all frames between, x 10^3 and x 10^2. `natural` and `linear` are given all true"
         " vertices. Normalised units.",
         "",
-        record.made_by(content),
+        *made,
         "",
         "| sequence | variant | runs | seconds | vertices | / natural | linear | natural | CD | / linear | floor | HD"
         " | drift mean, last | there and back | area, deviation |",
@@ -214,11 +240,11 @@ def markdown(content: dict) -> str:
     ]
     wide = []
     for name in SEQUENCES:
-        for label in (ONE, PAIRS):
+        for label in labels:
             lines.append(line(content, name, label))
             wide.append((label, of(content, name, label)))
     lines += ["", "Means of the three sequences, over `natural` for vertices and over `linear` for CD:", ""]
-    for label in (ONE, PAIRS):
+    for label in labels:
         mine = [rows for other, rows in wide if other == label]
         ones = [rows for other, rows in wide if other == ONE]
         vertices = np.mean([mean(rows, "carried_rms") for rows in mine])

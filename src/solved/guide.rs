@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use isomorph_spline::{SequenceField, SplineError, SplineField};
 use isomorph_training::data::Guide;
+use isomorph_training::key_times::KeyTimes;
 use isomorph_training::method::{self, spline};
 
 use super::completed::completed;
@@ -34,28 +35,15 @@ impl Guide for SplineGuide {
 /// A solved field through many key frames, and in how many steps its paths are followed from one to the next.
 struct SequenceGuide {
     field: SequenceField,
+    times: KeyTimes,
     trajectory_steps: usize,
     /// The interval used last: the samples of a step lie in one.
     part: Mutex<Option<(usize, Arc<SplineField<f32, 2>>)>>,
 }
 
 impl SequenceGuide {
-    /// The interval of a time, and the time within it.
-    fn at(&self, time: f32) -> usize {
-        let times = self.field.times();
-        let after = times.partition_point(|key| *key <= f64::from(time));
-        after.saturating_sub(1).min(times.len() - 2)
-    }
-
     fn within(&self, s: usize, time: f32) -> f32 {
-        let times = self.field.times();
-        let [from, to] = [times[s], times[s + 1]];
-        (((f64::from(time) - from) / (to - from)) as f32).clamp(0.0, 1.0)
-    }
-
-    fn length(&self, s: usize) -> f32 {
-        let times = self.field.times();
-        (times[s + 1] - times[s]) as f32
+        self.times.within(s, f64::from(time)) as f32
     }
 
     fn part(&self, s: usize) -> Arc<SplineField<f32, 2>> {
@@ -76,9 +64,11 @@ impl SequenceGuide {
         middles: impl Iterator<Item = f32>,
         mut of: impl FnMut(usize, &[usize]) -> Vec<[f32; 3]>,
     ) -> Vec<[f32; 3]> {
-        let intervals: Vec<usize> = middles.map(|time| self.at(time)).collect();
+        let intervals: Vec<usize> = middles
+            .map(|time| self.times.interval(f64::from(time)))
+            .collect();
         let mut out = vec![[0.0; 3]; intervals.len()];
-        for s in 0..self.field.times().len() - 1 {
+        for s in 0..self.times.intervals() {
             let rows: Vec<usize> = (0..intervals.len())
                 .filter(|k| intervals[*k] == s)
                 .collect();
@@ -99,7 +89,7 @@ impl Guide for SequenceGuide {
             let x: Vec<_> = rows.iter().map(|k| places[*k]).collect();
             let t: Vec<_> = rows.iter().map(|k| self.within(s, times[*k])).collect();
             let jets = self.part(s).jets(&x, &t).into_iter();
-            let length = self.length(s);
+            let length = self.times.length(s) as f32;
             jets.map(|jet| jet.value.map(|v| v / length)).collect()
         })
     }
@@ -203,6 +193,7 @@ pub(crate) fn guide(recipe: &Recipe, keyframes: &Keyframes) -> Result<Guidance, 
         Field::Sequence(field) => Ok(Guidance {
             completed: completed(|s| field.part(s), recipe, keyframes)?,
             guide: Arc::new(SequenceGuide {
+                times: KeyTimes::new(field.times().to_vec()),
                 field,
                 trajectory_steps,
                 part: Mutex::default(),

@@ -6,6 +6,7 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::deformation::{CarriedField, Deformation, PointMotion, SurfaceField};
+use crate::key_times::KeyTimes;
 
 /// Intervals that stay arranged: those used last.
 const KEPT: usize = 8;
@@ -24,8 +25,7 @@ pub type Arrange<P> = dyn Fn(usize, &Kept<P>) -> P + Send + Sync;
 /// Key frames, and what there is from each to the next.
 pub struct InTurns<P> {
     arrange: Box<Arrange<P>>,
-    /// The times of the key frames, 0 to 1.
-    times: Vec<f64>,
+    times: KeyTimes,
     kept: Mutex<Kept<P>>,
 }
 
@@ -34,7 +34,7 @@ impl<P: Interval> InTurns<P> {
     pub fn new(times: Vec<f64>, arrange: Box<Arrange<P>>) -> Self {
         Self {
             arrange,
-            times,
+            times: KeyTimes::new(times),
             kept: Mutex::default(),
         }
     }
@@ -55,22 +55,10 @@ impl<P: Interval> InTurns<P> {
         Arc::clone(&kept[kept.len() - 1].1)
     }
 
-    /// The interval of a time.
-    fn interval(&self, time: f64) -> usize {
-        let after = self.times.partition_point(|key| *key <= time);
-        after.saturating_sub(1).min(self.times.len() - 2)
-    }
-
     /// The time within the interval of a time, and the interval.
     fn at(&self, time: f64) -> (f64, Arc<P>) {
-        let s = self.interval(time);
-        (self.within(s, time), self.part(s))
-    }
-
-    /// A time in the interval `s`, 0 to 1.
-    fn within(&self, s: usize, time: f64) -> f64 {
-        let [from, to] = [self.times[s], self.times[s + 1]];
-        ((time - from) / (to - from)).clamp(0.0, 1.0)
+        let s = self.times.interval(time);
+        (self.times.within(s, time), self.part(s))
     }
 }
 
@@ -118,10 +106,10 @@ impl<P: Interval> CarriedField for InTurns<P> {
 
 impl<P: Interval> PointMotion for InTurns<P> {
     fn carry(&self, points: &[[f32; 3]], from: f64, to: f64) -> Vec<[f32; 3]> {
-        let (first, last) = (self.interval(from), self.interval(to));
+        let (first, last) = (self.times.interval(from), self.times.interval(to));
         let mut points = points.to_vec();
         let hop = |s: usize, points: &[[f32; 3]]| {
-            let [from, to] = [from, to].map(|time| self.within(s, time));
+            let [from, to] = [from, to].map(|time| self.times.within(s, time));
             if from == to {
                 return points.to_vec();
             }
@@ -140,8 +128,8 @@ impl<P: Interval> PointMotion for InTurns<P> {
     }
 
     fn velocities(&self, points: &[[f32; 3]], time: f64) -> Vec<[f32; 3]> {
-        let (s, (within, part)) = (self.interval(time), self.at(time));
-        let length = (self.times[s + 1] - self.times[s]) as f32;
+        let (within, part) = self.at(time);
+        let length = self.times.length(self.times.interval(time)) as f32;
         let found = part.velocities(points, within).into_iter();
         found.map(|v| v.map(|x| x / length)).collect()
     }

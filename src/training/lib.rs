@@ -26,6 +26,7 @@
 //! | `engine.rs` | the border to training: a backend without its type |
 //! | `probe.rs` | the operations of a run in small, to compare a device with another |
 //! | `deformation.rs` | the border to what was trained: values and motion of points on the host |
+//! | `key_times.rs` | which interval between key frames a time lies in |
 //! | `in_turns.rs` | the same through many key frames: what there is from each to the next |
 //! | `report.rs` | phases and terms, as they are reported |
 //! | `flop.rs` | what a step costs |
@@ -45,6 +46,7 @@ mod flow_step;
 pub mod guided;
 mod hollows;
 pub mod in_turns;
+pub mod key_times;
 pub mod method;
 mod motion;
 mod network_step;

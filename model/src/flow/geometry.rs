@@ -41,6 +41,8 @@ pub struct FlowGeometry<B: Backend> {
     velocity: Box<dyn VelocityField<B>>,
     /// Of the Runge-Kutta integrator over all of time.
     steps: usize,
+    /// Whether the weights of the two ends change smoothly where others follow.
+    is_eased: bool,
 }
 
 impl<B: ModelBackend> FlowGeometry<B> {
@@ -59,7 +61,28 @@ impl<B: ModelBackend> FlowGeometry<B> {
             ends,
             velocity: Box::new(velocity),
             steps,
+            is_eased: false,
         }
+    }
+
+    /// The same with the weight `t^2 (3 - 2 t)` of the target instead of `t`: between two of many key frames, so that
+    /// the weight of a key frame has no corner there.
+    #[must_use]
+    pub fn eased(self) -> Self {
+        Self {
+            is_eased: true,
+            ..self
+        }
+    }
+
+    /// The blend of what the two ends give at times `t`.
+    fn blend(&self, g: Tensor<B, 2>, h: Tensor<B, 2>, t: Tensor<B, 2>) -> Tensor<B, 2> {
+        let weight = if self.is_eased {
+            t.clone() * t.clone() * (-(t * 2.0) + 3.0)
+        } else {
+            t
+        };
+        between(g, h, weight)
     }
 
     /// Steps of the Runge-Kutta integrator over all of time.
@@ -113,7 +136,7 @@ impl<B: ModelBackend> FlowGeometry<B> {
 impl<B: ModelBackend> Geometry<B> for FlowGeometry<B> {
     fn value(&self, x: Tensor<B, 2>, t: Tensor<B, 2>) -> Tensor<B, 2> {
         let [g, h] = self.carried_values(x, t.clone());
-        between(g, h, t)
+        self.blend(g, h, t)
     }
 
     /// The gradient of each end field where the point comes from, carried back along with it.
@@ -130,7 +153,7 @@ impl<B: ModelBackend> Geometry<B> for FlowGeometry<B> {
         let [back, ahead] = self.shares(&t);
         let g = gradient(self.ends.source(), 0.0, back);
         let h = gradient(self.ends.target(), 1.0, ahead);
-        between(g, h, t.clone())
+        self.blend(g, h, t.clone())
     }
 
     fn carried(&self) -> Option<&dyn Carried<B>> {
@@ -155,7 +178,7 @@ impl<B: ModelBackend> Carried<B> for FlowGeometry<B> {
         let (start, end) = (ends.clone().slice([0..n, 0..3]), ends.slice([0..n, 3..6]));
         let [g, h] = self.end_values(start, end);
         let t = Tensor::full([n, 1], time, &g.device());
-        between(g, h, t)
+        self.blend(g, h, t)
     }
 }
 
@@ -244,6 +267,26 @@ mod tests {
         assert_close(host(flow.value(points(&X), zeros())), host(g), 0.0, "t = 0");
         let ones = column(&[1.0; 3]);
         assert_close(host(flow.value(points(&X), ones)), host(h), 0.0, "t = 1");
+    }
+
+    #[test]
+    fn an_eased_weight_has_no_corner_at_the_ends() {
+        let (flow, eased) = (geometry(), geometry().eased());
+        for (t, weight) in [(0.0, 0.0), (0.25, 0.15625), (0.5, 0.5), (1.0, 1.0)] {
+            let time = || column(&[t; 3]);
+            let [g, h] = flow.carried_values(points(&X), time()).map(host);
+            let wanted = g
+                .iter()
+                .zip(&h)
+                .map(|(g, h)| (1.0 - weight) * g + weight * h);
+            let found = host(eased.value(points(&X), time()));
+            assert_close(found.clone(), wanted.collect(), 1e-6, "value");
+            let from = eased.value_from(eased.ends(points(&X), t), t);
+            assert_close(host(from), found, 1e-6, "from the ends");
+            let [plain, own] = [&flow, &eased].map(|of| host(of.gradient(points(&X), time())));
+            let same = plain.iter().zip(&own).all(|(a, b)| (a - b).abs() < 1e-6);
+            assert_eq!(same, weight == t, "the gradient at {t}");
+        }
     }
 
     #[test]

@@ -184,7 +184,7 @@ impl<B: TrainBackend> Method<B> for EndsThroughKeys<B> {
             let ends = EndFields::beside(ends[s].clone(), ends[s + 1].clone());
             let (v, probes) = (velocity.interval(s), rows(&lattice, &device));
             let geometry: Box<dyn Geometry<B::InnerBackend>> =
-                Box::new(FlowGeometry::new(ends, v.clone(), probes));
+                Box::new(FlowGeometry::new(ends, v.clone(), probes).eased());
             let motion: Box<dyn isomorph_model::Motion<B::InnerBackend>> = Box::new(v);
             (geometry, motion)
         };
