@@ -35,6 +35,8 @@ class Run:
         self.first, last = self.about["clock"]
         self.span = last - self.first
         self.splines = self.about.get("splines")
+        # From each key frame to the next: of networks there are none where there are two.
+        self.intervals = (self.splines or self.about).get("intervals")
         if self.about["placements"]:
             raise ValueError("shapes were laid onto each other (data.align): use `isomorph field`")
 
@@ -49,6 +51,13 @@ class Run:
             return self._blend(x, t) / self.scale
         if self.about["geometry"] == "network":
             return self._f("implicit", x, t) / self.scale
+        if self.intervals:
+            k, part = self._part(t)
+            own = (t - part["from"]) / (part["to"] - part["from"])
+            weight = own**2 * (3 - 2 * own)
+            g = self._f(f"end.{k:04}", self._carried(x, t, part["from"]), 0.0)
+            h = self._f(f"end.{k + 1:04}", self._carried(x, t, part["to"]), 0.0)
+            return ((1 - weight) * g + weight * h) / self.scale
         g = self._f("source", self._carried(x, t, 0.0), 0.0)
         h = self._f("target", self._carried(x, t, 1.0), 0.0)
         return ((1 - t) * g + t * h) / self.scale
@@ -66,8 +75,8 @@ class Run:
 
     def _carried(self, x: np.ndarray, start: float, end: float) -> np.ndarray:
         """Runge-Kutta steps of order 4, each span of time with its share of them."""
-        if self.splines:
-            parts = self.splines["intervals"]
+        if self.intervals:
+            parts = self.intervals
             for part in parts if start <= end else parts[::-1]:
                 a, b = (np.clip(t, part["from"], part["to"]) for t in (start, end))
                 if a != b:
@@ -103,19 +112,29 @@ class Run:
             return self._spline(x, t, part or self._part(t)[1])
         about = self.about["networks"]["velocity"]
         features = self._encoded(x, about["frequencies"])
+        if self.intervals:
+            return self._in_turns(self._mlp("velocity", features), t, part or self._part(t)[1])
         if about["time_dependent"]:
             features = np.hstack([features, np.full((len(x), 1), t - 0.5)])
         return self._mlp("velocity", features)
 
     def _part(self, t: float) -> tuple[int, dict]:
         """The interval of a time: the last one that has begun."""
-        parts = self.splines["intervals"]
+        parts = self.intervals
         k = max((k for k, part in enumerate(parts) if part["from"] <= t), default=0)
         return k, parts[k]
 
+    def _in_turns(self, outputs: np.ndarray, t: float, part: dict) -> np.ndarray:
+        """The outputs that act in an interval, by its functions of time."""
+        first = 3 * self.intervals.index(part)
+        own = (t - part["from"]) / (part["to"] - part["from"])
+        weights = np.array(part["time_functions"]) @ own ** np.arange(3)
+        v = np.einsum("nka,k->na", outputs[:, first : first + 9].reshape(-1, 3, 3), weights)
+        return v / (part["to"] - part["from"])
+
     def _spline(self, x: np.ndarray, t: float, part: dict) -> np.ndarray:
         """Quadratic B-splines in space, polynomials in the interval's own time."""
-        c = self.arrays[f"velocity.{self.splines['intervals'].index(part)}.coefficients"]
+        c = self.arrays[f"velocity.{self.intervals.index(part)}.coefficients"]
         own = (t - part["from"]) / (part["to"] - part["from"])
         c = np.einsum("xyzka,k->xyza", c, np.array(part["time_functions"]) @ own ** np.arange(3))
         place = np.clip((x - part["lower"]) / part["spacing"], 0, part["cells"])
@@ -135,7 +154,7 @@ class Run:
         if any(self.splines["partial"][k : k + 2]):
             raise ValueError("a shape is known in part: its blend is more than this script knows")
         own = (t - part["from"]) / (part["to"] - part["from"])
-        weight = own if len(self.splines["intervals"]) == 1 else own**2 * (3 - 2 * own)
+        weight = own if len(self.intervals) == 1 else own**2 * (3 - 2 * own)
         g = self._signed(k, self._carried(x, t, part["from"]))
         h = self._signed(k + 1, self._carried(x, t, part["to"]))
         return (1 - weight) * g + weight * h

@@ -9,6 +9,7 @@ use std::path::Path;
 
 use isomorph_training::method::spec_of;
 use isomorph_training::method::spline::is_solved;
+use isomorph_training::weights::{IntervalWeights, Weights};
 use safetensors::tensor::{Dtype, TensorView, serialize};
 use serde_json::{Value, json};
 
@@ -95,14 +96,6 @@ fn networks(
     checkpoint: &Checkpoint,
     backend: Backend,
 ) -> Result<Arrays> {
-    let keys = recipe.data.keyframes.len();
-    if keys > 2 {
-        return Err(Error::usage(format!(
-            "{}: networks are exported where they are trained on two key frames, and these have {keys}; take the preset \
-             \"instant\", whose splines are exported through any number",
-            run.display()
-        )));
-    }
     let trainer = restored(checkpoint, recipe, &*backend.open()?)?;
     let weights = trainer.weights().ok_or_else(|| {
         Error::usage(format!(
@@ -111,12 +104,13 @@ fn networks(
             spec_of(recipe).described()
         ))
     })?;
+    let about = described(recipe, checkpoint, &weights);
     let parts = weights.tensors.into_iter();
     Ok(Arrays {
         parts: parts
             .map(|tensor| Part::floats(tensor.name, tensor.shape, &tensor.values))
             .collect(),
-        about: described(recipe, checkpoint, weights.flow_steps),
+        about,
     })
 }
 
@@ -153,7 +147,7 @@ fn frame(recipe: &Recipe, checkpoint: &Checkpoint) -> Value {
 }
 
 /// All that it takes to evaluate the networks.
-fn described(recipe: &Recipe, checkpoint: &Checkpoint, flow_steps: Option<usize>) -> Value {
+fn described(recipe: &Recipe, checkpoint: &Checkpoint, weights: &Weights) -> Value {
     let f = &recipe.implicit;
     let v = &recipe.velocity;
     let field = json!({
@@ -164,16 +158,25 @@ fn described(recipe: &Recipe, checkpoint: &Checkpoint, flow_steps: Option<usize>
         "depth": v.depth, "activation": v.activation.to_string(), "beta": v.beta,
         "frequencies": v.frequencies, "skip": v.skip, "time_dependent": v.time_dependent,
     }});
-    let names: &[&str] = match recipe.implicit.geometry {
-        GeometryKind::Flow => &["source", "target"],
-        GeometryKind::Network => &["implicit"],
+    let of = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
+    let names: Vec<String> = match (recipe.implicit.geometry, recipe.data.keyframes.len()) {
+        (GeometryKind::Network, _) => of(&["implicit"]),
+        (GeometryKind::Flow, 2) => of(&["source", "target"]),
+        (GeometryKind::Flow, keys) => (0..keys).map(|k| format!("end.{k:04}")).collect(),
     };
     for name in names {
-        networks[*name] = field.clone();
+        networks[name] = field.clone();
     }
     let mut about = frame(recipe, checkpoint);
     about["geometry"] = json!(recipe.implicit.geometry.to_string());
-    about["flow_steps"] = json!(flow_steps);
+    about["flow_steps"] = json!(weights.flow_steps);
+    if !weights.intervals.is_empty() {
+        let interval = |of: &IntervalWeights| {
+            let [from, to] = of.ends;
+            json!({"from": from, "to": to, "time_functions": of.functions, "steps": of.steps})
+        };
+        about["intervals"] = weights.intervals.iter().map(interval).collect();
+    }
     about["networks"] = networks;
     about
 }

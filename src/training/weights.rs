@@ -21,8 +21,23 @@ pub struct NamedTensor {
 pub struct Weights {
     /// All arrays.
     pub tensors: Vec<NamedTensor>,
-    /// Steps of the integrator over all of time, where a flow carries the geometry.
+    /// Steps of the integrator over all of time, where a flow carries the geometry between two key frames.
     pub flow_steps: Option<usize>,
+    /// From each key frame to the next, where there are more than two.
+    pub intervals: Vec<IntervalWeights>,
+}
+
+/// What it takes to evaluate networks from one key frame to the next.
+#[derive(Clone, Debug, PartialEq)]
+pub struct IntervalWeights {
+    /// Its ends, in a time from 0 to 1.
+    pub ends: [f64; 2],
+    /// The functions of time of the velocity's outputs that act there, three for each, as `a + b u + c u^2` with `u` from
+    /// 0 to 1 within the interval: those of its number and of the two after it. The velocity is per length of the
+    /// interval.
+    pub functions: [[f64; 3]; 3],
+    /// Steps of the integrator over the interval.
+    pub steps: usize,
 }
 
 impl Weights {

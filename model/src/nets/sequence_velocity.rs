@@ -78,6 +78,11 @@ impl<B: ModelBackend> SequenceVelocity<B> {
         &self.times
     }
 
+    /// The network of all `V_k` side by side.
+    pub fn net(&self) -> &VelocityNet<B> {
+        &self.net
+    }
+
     /// The weight matrices between two hidden layers.
     pub fn hidden_weights(&self) -> Vec<ParamId> {
         self.net.hidden_weights()
@@ -109,6 +114,12 @@ impl<B: ModelBackend> SequenceVelocity<B> {
 }
 
 impl<B: ModelBackend> IntervalVelocity<B> {
+    /// The functions of time that act, as `a + b t + c t^2` with `t` from 0 to 1: those of the outputs of this interval's
+    /// number and of the two after it.
+    pub fn functions(&self) -> &[[f64; 3]; ACTING] {
+        &self.functions
+    }
+
     /// `V(x, t)`.
     ///
     /// # Shapes

@@ -11,6 +11,7 @@
 use std::io;
 
 use burn::module::Module;
+use burn::tensor::Tensor;
 use isomorph_model::flow::end_fields::{EndFields, end_field};
 use isomorph_model::{
     FlowGeometry, Geometry, ImplicitNet, SequenceVelocity, SequenceVelocityConfig, TrainBackend,
@@ -28,6 +29,7 @@ use crate::schedule::Schedule;
 use crate::settings::Settings;
 use crate::tensors::rows;
 use crate::turns::turn;
+use crate::weights::{IntervalWeights, Weights};
 
 /// The end fields, the velocity field and how they are trained.
 pub(super) struct EndsThroughKeys<B: TrainBackend> {
@@ -92,6 +94,15 @@ impl<B: TrainBackend> EndsThroughKeys<B> {
             ends,
             settings,
         }
+    }
+
+    fn valid_ends(&self) -> Vec<ImplicitNet<B::InnerBackend>> {
+        self.ends.iter().map(Trainee::valid).collect()
+    }
+
+    /// Points that decide how finely the flow is followed.
+    fn probes(&self) -> Tensor<B::InnerBackend, 2> {
+        rows(&flow::lattice(&self.bounds), &self.device)
     }
 
     /// The interval of a step.
@@ -168,6 +179,27 @@ impl<B: TrainBackend> Method<B> for EndsThroughKeys<B> {
         self.velocity.restore(records)
     }
 
+    fn weights(&self) -> Option<Weights> {
+        let (ends, velocity) = (self.valid_ends(), self.velocity.valid());
+        let mut weights = Weights::default();
+        for (k, end) in ends.iter().enumerate() {
+            weights.add(&format!("end.{k:04}"), end);
+        }
+        weights.add("velocity", velocity.net());
+        let between = self.times.windows(2).enumerate().map(|(s, two)| {
+            let v = velocity.interval(s);
+            let (functions, probes) = (*v.functions(), self.probes());
+            let ends = EndFields::beside(ends[s].clone(), ends[s + 1].clone());
+            IntervalWeights {
+                ends: [two[0], two[1]],
+                functions,
+                steps: FlowGeometry::new(ends, v, probes).steps(),
+            }
+        });
+        weights.intervals = between.collect();
+        Some(weights)
+    }
+
     fn geometry(&self) -> Option<Box<dyn Geometry<B::InnerBackend>>> {
         None
     }
@@ -177,7 +209,7 @@ impl<B: TrainBackend> Method<B> for EndsThroughKeys<B> {
     }
 
     fn through(&self) -> Option<Through<B::InnerBackend>> {
-        let ends: Vec<_> = self.ends.iter().map(Trainee::valid).collect();
+        let ends = self.valid_ends();
         let velocity = self.velocity.valid();
         let (lattice, device) = (flow::lattice(&self.bounds), self.device.clone());
         let part = move |s: usize| {
