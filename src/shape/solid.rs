@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::border::{Known, KnownSearch};
 use super::far::FarField;
-use super::keyframes::{Keyframe, Sheet};
+use super::keyframes::{Keyframe, PointCloud, Sheet};
 use super::reconstruct::reconstruct;
 use crate::geometry::linear::{cross, difference, scaled, unit};
 use crate::geometry::{Closest, Mesh, TriangleSearch};
@@ -74,6 +74,18 @@ impl SolidParts {
                 closed.map(|mesh| of(mesh, false))
             }
         }
+    }
+
+    /// Of points with normals that are known all around; `None` if they have no normals, or close to nothing.
+    pub(crate) fn of_cloud(cloud: &PointCloud) -> Option<Self> {
+        let closed = reconstruct(&cloud.points, cloud.normals.as_ref()?)?;
+        Some(Self {
+            points: closed.vertices,
+            triangles: closed.triangles,
+            may_overlap: false,
+            known: None,
+            thickness: None,
+        })
     }
 
     /// Whether [`Solid::new`] makes a shape of them.

@@ -48,9 +48,40 @@ pub(super) fn completed<const H: usize>(
     recipe: &Recipe,
     keyframes: &Keyframes,
 ) -> Result<Vec<Option<PointCloud>>, String> {
+    completed_where(|_| true, field, recipe, keyframes)
+}
+
+/// Whether a key frame in the midst of others is known in part, and a neighbour is whole.
+pub(super) fn is_any_completed(keys: &[Keyframe]) -> bool {
+    keys.len() > 2 && (0..keys.len()).any(|k| has_whole_neighbour(keys, k))
+}
+
+fn has_whole_neighbour(keys: &[Keyframe], k: usize) -> bool {
+    !keys[k].border.is_empty() && keys[k].sheet.is_none() && encloses(&keys[neighbour(keys, k)])
+}
+
+/// The same of those that are known in part beside one that is whole: splines blend two that are not.
+///
+/// # Errors
+/// Those of [`completed`].
+pub(super) fn of_whole_neighbours<const H: usize>(
+    field: impl Fn(usize) -> SplineField<f32, H>,
+    recipe: &Recipe,
+    keyframes: &Keyframes,
+) -> Result<Vec<Option<PointCloud>>, String> {
+    let keys = &keyframes.keys;
+    completed_where(|k| has_whole_neighbour(keys, k), field, recipe, keyframes)
+}
+
+fn completed_where<const H: usize>(
+    is_wanted: impl Fn(usize) -> bool,
+    field: impl Fn(usize) -> SplineField<f32, H>,
+    recipe: &Recipe,
+    keyframes: &Keyframes,
+) -> Result<Vec<Option<PointCloud>>, String> {
     let (keys, seed) = (&keyframes.keys, recipe.training.seed);
     let mut found = vec![None; keys.len()];
-    for k in (0..keys.len()).filter(|k| !encloses(&keys[*k])) {
+    for k in (0..keys.len()).filter(|k| !encloses(&keys[*k]) && is_wanted(*k)) {
         let s = neighbour(keys, k).min(k);
         let solid = |k: usize| SolidParts::of(&keys[k]).and_then(Solid::new).map(Arc::new);
         let (Some(first), Some(second)) = (solid(s), solid(s + 1)) else {

@@ -55,6 +55,8 @@ pub(crate) struct Solved {
     step: usize,
     /// What the field carries; none before the checkpoint of a run that is only looked at is read.
     shapes: Option<Shapes>,
+    /// Of key frames that are completed after the last step, if there are any.
+    partial: Option<Box<(Recipe, Keyframes)>>,
 }
 
 /// Where the field is.
@@ -88,6 +90,8 @@ impl Solved {
             motion: Motion::Sought(solver),
             step: 0,
             shapes: Some(shapes),
+            partial: completed::is_any_completed(&keyframes.keys)
+                .then(|| Box::new((recipe.clone(), keyframes.clone()))),
         })
     }
 
@@ -97,6 +101,7 @@ impl Solved {
             motion: Motion::Unread,
             step: 0,
             shapes: None,
+            partial: None,
         }
     }
 
@@ -105,6 +110,26 @@ impl Solved {
             Motion::Sought(solver) => solver.field(),
             Motion::Found(field) => field.clone(),
             Motion::Unread => unreachable!("{READ_FIRST}"),
+        }
+    }
+
+    /// Completes key frames in the midst of others that are known in part, once the motion is found.
+    fn complete(&mut self) {
+        let (Some(of), Field::Sequence(field)) = (&self.partial, self.field()) else {
+            return;
+        };
+        let (recipe, keyframes) = &**of;
+        let part = |s: usize| field.part(s);
+        // A surface that is not found leaves the shape as it is: known in part.
+        let found = completed::of_whole_neighbours(part, recipe, keyframes).unwrap_or_default();
+        let mut parts: Vec<SolidParts> = self.shapes().parts().into_iter().cloned().collect();
+        for (parts, cloud) in parts.iter_mut().zip(found) {
+            if let Some(whole) = cloud.and_then(|cloud| SolidParts::of_cloud(&cloud)) {
+                *parts = whole;
+            }
+        }
+        if let Ok(shapes) = Shapes::of(parts) {
+            self.shapes = Some(shapes);
         }
     }
 
@@ -133,6 +158,7 @@ impl Trainer for Solved {
             raw,
             weighted: weight * raw,
         };
+        let steps = solver.steps();
         match solver.advance(step) {
             Ok(report) => {
                 let Terms {
@@ -143,6 +169,9 @@ impl Trainer for Solved {
                     screw: unsteady,
                 } = report.terms;
                 self.step = step + 1;
+                if self.step == steps {
+                    self.complete();
+                }
                 read.then(|| {
                     vec![
                         term("matching", matching, matched),
@@ -184,6 +213,10 @@ impl Trainer for Solved {
                 let resumed = solver.resume_from(field, step);
                 let resumed = resumed.ok_or_else(stored::other_kind)?;
                 resumed.map_err(|error| stored::misfit(&error))?;
+                if step == solver.steps() && self.partial.is_some() {
+                    // They are completed.
+                    self.shapes = Some(stored::shapes(parts)?);
+                }
             }
             motion => {
                 self.shapes = Some(stored::shapes(parts)?);

@@ -179,8 +179,9 @@ fn networks_learn_a_sheet_with_its_thickness_on_both_sides_and_around_its_rim() 
     }
 }
 
-#[test]
-fn a_key_frame_in_the_middle_is_completed_once_from_a_neighbour_that_is_whole() {
+/// Three balls, each 0.2 further, the second without what is higher than it is seen: the whole second one, normalised,
+/// and the key frames.
+fn cut_in_the_middle() -> (Mesh<f32>, Keyframes) {
     let ball = bumpy_sphere(48);
     let at = |by: f64| ball.moved(|[x, y, z]| [x + by, y, z]);
     let normals = ball.vertex_normals();
@@ -210,19 +211,57 @@ fn a_key_frame_in_the_middle_is_completed_once_from_a_neighbour_that_is_whole() 
     };
     let shapes = [Shape::of(at(0.0)), cut, Shape::of(at(0.4))];
     let keyframes = prepare(&shapes, &options).expect("shapes");
+    let frame = keyframes.normalisation;
+    (middle.moved(|x| frame.apply(x)), keyframes)
+}
+
+fn through_three(preset: &str) -> Recipe {
     let files = [("a.ply", 0.0), ("b.ply", 0.5), ("c.ply", 1.0)];
     let mut recipe = Recipe::through(&files).expect("three files");
-    recipe.with("preset=quick").expect("a recipe");
-    let found = guide(&recipe, &keyframes).expect("a field").completed;
+    recipe.with(preset).expect("a recipe");
+    recipe
+}
+
+#[test]
+fn a_key_frame_in_the_middle_is_completed_once_from_a_neighbour_that_is_whole() {
+    let (truth, keyframes) = cut_in_the_middle();
+    let found = guide(&through_three("preset=quick"), &keyframes);
+    let found = found.expect("a field").completed;
     let known: Vec<bool> = found.iter().map(Option::is_none).collect();
     assert_eq!(known, [true, false, true]);
     let whole = found[1].as_ref().expect("it is cut");
     let added = &whole.points[keyframes.keys[1].cloud.points.len()..];
     assert!(added.len() > 300, "{}", added.len());
-    let frame = &keyframes.normalisation;
-    let truth = middle.moved(|x| frame.apply(x));
     let search = TriangleSearch::new(&truth).expect("it has area");
     let off = added.iter().map(|x| search.closest(*x, 0).squared.sqrt());
     let off = mean(&off.collect::<Vec<_>>());
     assert!(off < 0.02, "{off}");
+}
+
+#[test]
+fn splines_carry_a_completed_key_frame_from_either_side() {
+    let (truth, keyframes) = cut_in_the_middle();
+    let recipe = through_three("preset=instant");
+    let solved = trained(&recipe, &keyframes);
+    let cut = keyframes.normalisation.apply([0.0, 0.0, SEEN])[2];
+    let hidden: Vec<[f32; 3]> = (truth.vertices.iter().copied())
+        .filter(|x| x[2] > cut + 0.05)
+        .collect();
+    let off = |solved: &Solved, time: f64| {
+        let deformation = solved.deformation();
+        mean(&deformation.field().expect("one").values(&hidden, time))
+    };
+    for time in [0.499, 0.5, 0.501] {
+        let off = off(&solved, time);
+        assert!(off < 0.015, "{off} at {time}");
+    }
+    // The checkpoint has it too, for whoever goes on, and for whoever only looks.
+    let records = solved.records().expect("encodes");
+    let mut again = Solved::new(&recipe, &keyframes).expect("a problem");
+    again.restore(&records).expect("its own");
+    let mut looked_at = Solved::unset();
+    looked_at.restore(&records).expect("its own");
+    for other in [&again, &looked_at] {
+        assert_eq!(off(other, 0.5), off(&solved, 0.5));
+    }
 }
