@@ -106,9 +106,7 @@ pub(super) fn run(args: MorphArgs) -> Result {
         |event| watch.observe(event),
     );
     let page = match first {
-        Err(Failure::Library(error))
-            if args.preset.is_none() && files.len() == 2 && error.calls_for_networks() =>
-        {
+        Err(Failure::Library(error)) if args.preset.is_none() && error.calls_for_networks() => {
             let finding = format!("the preset instant failed ({error})");
             let note = Doubt {
                 finding,

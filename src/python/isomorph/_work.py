@@ -42,7 +42,7 @@ def morph(
     Args:
         source: the shape at time 0; see `Shape.of` for what is a shape.
         target: the shape at time 1.
-        more: further shapes, at the times 2, 3 and so on. Then the preset is "instant".
+        more: further shapes, at the times 2, 3 and so on.
         preset: "instant" (seconds), "quick", "default" (minutes) or "quality".
         times: those of the shapes, in any unit, ascending; 0, 1, 2 and so on without it.
         pairs: corresponding points as an array `(n, 2)` of vertex numbers, or the path of a file. Or "same-vertices",

@@ -337,8 +337,8 @@ def test_three_shapes_are_one_motion_in_their_own_time(place):
         run.surface(t=6)
     with pytest.raises(ValueError, match="2 times for 3 files"):
         isomorph.morph(at(0), at(2), at(5), times=[0, 2], run="other")
-    with pytest.raises(ValueError, match="networks are trained on two"):
-        isomorph.morph(at(0), at(2), at(5), preset="quick", run="other")
+    with pytest.raises(ValueError, match="takes two key frames"):
+        isomorph.morph(at(0), at(2), at(5), preset="paper", run="other")
 
 
 def test_a_run_is_measured_against_true_frames(run, place):
