@@ -128,6 +128,8 @@ def measured(options: argparse.Namespace, command: str) -> dict:
 def with_networks(content: dict, options: argparse.Namespace, command: str) -> dict:
     """The same with rows of networks, and how these were measured."""
     place = command_line.sequences(options)
+    # As many as the other rows were measured with: what distances have of the noise of samples is the same.
+    options.samples = content["settings"]["samples"]
     rows = [found for found in content["rows"] if found["variant"] != NETWORKS]
     for name in SEQUENCES:
         bench = Bench(options, read_sequence(place / f"{name}.anime"))
@@ -222,7 +224,7 @@ def markdown(content: dict) -> str:
     labels = [ONE, PAIRS]
     if networks := content.get("networks"):
         labels.append(NETWORKS)
-        made.append(f"Networks: {record.made_by({**content, **networks})}")
+        made[-1] += f" Networks: made by {record.made_by({**content, **networks}).removeprefix('Made by ')}"
     keys = ", ".join(map(str, content["settings"]["keys"]))
     lines = [
         "# Motions through many key frames",

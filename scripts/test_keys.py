@@ -96,7 +96,7 @@ class Keys(unittest.TestCase):
         table = (folder / "table.md").read_text()
         self.assertIn("| bear_walk | one field | 1 | 2.5 | 0.100 |", table)
         self.assertIn("| bear_walk | networks (`default`) | 2 | 2.5 | 0.300 | 0.75 |", table)
-        self.assertIn("Networks: Made by `scripts/keys.py --networks --seeds 2", table)
+        self.assertIn("Networks: made by `scripts/keys.py --networks --seeds 2", table)
         # Measured again, they take the place of those before.
         self.run_script("--networks", "--seeds", "1")
         self.assertEqual(len(json.loads((folder / "data.json").read_text())["rows"]), 3 * 2 + 3 + 3)
