@@ -19,48 +19,41 @@ impl Keyframes {
 
 /// The points of a cloud at a time as methods sample them.
 pub(crate) fn trained(time: f64, cloud: &PointCloud) -> KeyPoints {
-    let around = Arc::new(Around::new(cloud));
-    KeyPoints::new(
-        time as f32,
-        cloud.points.clone(),
-        cloud.normals.clone(),
-        around,
-    )
+    let points: Arc<[[f32; 3]]> = cloud.points.as_slice().into();
+    let normals: Option<Arc<[[f32; 3]]>> = cloud.normals.as_deref().map(Arc::from);
+    let around = Around {
+        points: points.clone(),
+        normals: normals.clone(),
+        distance: OnceLock::new(),
+        search: OnceLock::new(),
+    };
+    KeyPoints::new(time as f32, points, normals, Arc::new(around))
 }
 
 /// Searches around a cloud, each made on its first use: most methods need none.
 struct Around {
-    cloud: PointCloud,
+    points: Arc<[[f32; 3]]>,
+    normals: Option<Arc<[[f32; 3]]>>,
     distance: OnceLock<SignedDistance>,
     search: OnceLock<NeighbourSearch>,
 }
 
-impl Around {
-    fn new(cloud: &PointCloud) -> Self {
-        Self {
-            cloud: cloud.clone(),
-            distance: OnceLock::new(),
-            search: OnceLock::new(),
-        }
-    }
-}
-
 impl Surroundings for Around {
     fn signed_distance(&self, x: [f32; 3]) -> Option<f32> {
-        let normals = self.cloud.normals.as_ref()?;
+        let normals = self.normals.as_ref()?;
         let distance = self
             .distance
-            .get_or_init(|| SignedDistance::new(&self.cloud.points, normals));
+            .get_or_init(|| SignedDistance::new(&self.points, normals));
         Some(distance.at(x))
     }
 
     fn nearest(&self, point: usize, count: NonZeroUsize) -> Vec<usize> {
         let search = self.search.get_or_init(|| {
-            let points = self.cloud.points.iter();
+            let points = self.points.iter();
             let points: Vec<[f64; 3]> = points.map(|point| point.map(f64::from)).collect();
             NeighbourSearch::new(&points)
         });
-        let found = search.nearest(self.cloud.points[point].map(f64::from), count);
+        let found = search.nearest(self.points[point].map(f64::from), count);
         found.iter().map(|found| found.index as usize).collect()
     }
 }

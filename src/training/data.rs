@@ -131,14 +131,14 @@ impl KeyPoints {
     /// Positions at a time, with unit normals where they are known, and searches around them.
     pub fn new(
         time: f32,
-        points: Vec<[f32; 3]>,
-        normals: Option<Vec<[f32; 3]>>,
+        points: impl Into<Arc<[[f32; 3]]>>,
+        normals: Option<Arc<[[f32; 3]]>>,
         around: Arc<dyn Surroundings>,
     ) -> Self {
         Self {
             time,
             points: points.into(),
-            normals: normals.map(Arc::from),
+            normals,
             around,
             hollows: Arc::default(),
         }

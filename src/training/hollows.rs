@@ -160,7 +160,7 @@ mod tests {
 
     fn hollows(hollow: f32, channel: f32) -> Hollows {
         let around = Arc::new(Ball { hollow, channel });
-        let normals = Some(vec![[1.0, 0.0, 0.0]]);
+        let normals = Some(vec![[1.0, 0.0, 0.0]].into());
         let key = KeyPoints::new(0.0, vec![[0.0; 3]], normals, around);
         let bounds = Bounds {
             min: [-1.2; 3],

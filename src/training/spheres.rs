@@ -33,7 +33,12 @@ impl TrainingData {
                 centre: [offset, 0.0, 0.0],
                 points: points.clone(),
             };
-            KeyPoints::new(time, points, Some(normals.clone()), Arc::new(around))
+            KeyPoints::new(
+                time,
+                points,
+                Some(normals.as_slice().into()),
+                Arc::new(around),
+            )
         };
         let (source, target) = (key(0.0, -OFFSET), key(1.0, OFFSET));
         let pairs = source.points.iter().copied();
