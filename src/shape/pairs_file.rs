@@ -132,11 +132,35 @@ impl Correspondences {
     }
 }
 
+/// What the first line of a text that is no comment says of the others.
+#[derive(Default)]
+struct Heading {
+    is_passed: bool,
+    /// Whether the first column is an index.
+    has_index: bool,
+}
+
+impl Heading {
+    /// The fields of the next line that is no comment; none of a line of names.
+    fn fields_below<'a>(&mut self, line: &'a str) -> Option<Vec<&'a str>> {
+        let mut fields: Vec<&str> = fields(line).collect();
+        if !std::mem::replace(&mut self.is_passed, true) && are_names(&fields) {
+            // As pandas writes its index: a column without a name.
+            self.has_index = fields.len() > 2 && unquoted(fields[0]).is_empty();
+            return None;
+        }
+        if self.has_index && !fields.is_empty() {
+            fields.remove(0);
+        }
+        Some(fields)
+    }
+}
+
 impl Rows {
     fn of_text(path: &Path, bytes: &[u8], layout: Layout) -> Result<Self, ShapeError> {
         let mut found = Self::default();
         let tracks = tracks::columns(layout, || tracks::rows_of_text(bytes));
-        let (mut names_allowed, mut has_index) = (true, false);
+        let mut heading = Heading::default();
         for (at, line) in lines(bytes) {
             if let Some(comment) = line.strip_prefix('#') {
                 let is = |first: u64| {
@@ -147,15 +171,9 @@ impl Rows {
                 found.declared = found.declared.or(is(0)).or(is(1));
                 continue;
             }
-            let mut fields: Vec<&str> = fields(&line).collect();
-            if std::mem::take(&mut names_allowed) && are_names(&fields) {
-                // As pandas writes its index: a column without a name.
-                has_index = fields.len() > 2 && unquoted(fields[0]).is_empty();
+            let Some(fields) = heading.fields_below(&line) else {
                 continue;
-            }
-            if has_index && !fields.is_empty() {
-                fields.remove(0);
-            }
+            };
             let wrong = |allowed: &str| {
                 ShapeError::line(path, at, format!("{:?}: {allowed}", shown(&line)))
             };

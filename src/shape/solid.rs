@@ -60,20 +60,20 @@ impl SolidParts {
                 thickness: Some(*thickness),
             });
         }
-        let of = |mesh: Mesh<f32>, may_overlap| Self {
-            points: mesh.vertices,
-            triangles: mesh.triangles,
-            may_overlap,
-            known: Known::of(&key.cloud.points, &key.border),
-            thickness: None,
+        let parts = match &key.mesh {
+            Some(mesh) => Self {
+                points: mesh.vertices.clone(),
+                triangles: mesh.triangles.clone(),
+                may_overlap: true,
+                known: None,
+                thickness: None,
+            },
+            None => Self::of_cloud(&key.cloud)?,
         };
-        match &key.mesh {
-            Some(mesh) => Some(of(mesh.clone(), true)),
-            None => {
-                let closed = reconstruct(&key.cloud.points, key.cloud.normals.as_ref()?);
-                closed.map(|mesh| of(mesh, false))
-            }
-        }
+        Some(Self {
+            known: Known::of(&key.cloud.points, &key.border),
+            ..parts
+        })
     }
 
     /// Of points with normals that are known all around; `None` if they have no normals, or close to nothing.

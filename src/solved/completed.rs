@@ -36,7 +36,8 @@ pub(crate) fn encloses(key: &Keyframe) -> bool {
 }
 
 /// For each key frame its points and those that complete it, or `None` where it is known: by a field that is solved for
-/// already, of which `field` gives the part from each key frame to the next.
+/// already, of which `field` gives the part from each key frame to the next. `parts` gives what the shapes are made of;
+/// only key frames that are wanted are completed.
 ///
 /// A shape that is known in part is completed once, from one of its neighbours, so that its surface is the same from
 /// either side.
@@ -44,50 +45,30 @@ pub(crate) fn encloses(key: &Keyframe) -> bool {
 /// # Errors
 /// If the surface cannot be found: the reason, as a part of a sentence.
 pub(super) fn completed<const H: usize>(
-    field: impl Fn(usize) -> SplineField<f32, H>,
-    recipe: &Recipe,
-    keyframes: &Keyframes,
-) -> Result<Vec<Option<PointCloud>>, String> {
-    completed_where(|_| true, field, recipe, keyframes)
-}
-
-/// Whether a key frame in the midst of others is known in part, and a neighbour is whole.
-pub(super) fn is_any_completed(keys: &[Keyframe]) -> bool {
-    keys.len() > 2 && (0..keys.len()).any(|k| has_whole_neighbour(keys, k))
-}
-
-fn has_whole_neighbour(keys: &[Keyframe], k: usize) -> bool {
-    !keys[k].border.is_empty() && keys[k].sheet.is_none() && encloses(&keys[neighbour(keys, k)])
-}
-
-/// The same of those that are known in part beside one that is whole: splines blend two that are not.
-///
-/// # Errors
-/// Those of [`completed`].
-pub(super) fn of_whole_neighbours<const H: usize>(
-    field: impl Fn(usize) -> SplineField<f32, H>,
-    recipe: &Recipe,
-    keyframes: &Keyframes,
-) -> Result<Vec<Option<PointCloud>>, String> {
-    let keys = &keyframes.keys;
-    completed_where(|k| has_whole_neighbour(keys, k), field, recipe, keyframes)
-}
-
-fn completed_where<const H: usize>(
     is_wanted: impl Fn(usize) -> bool,
+    parts: impl Fn(usize) -> Option<SolidParts>,
     field: impl Fn(usize) -> SplineField<f32, H>,
     recipe: &Recipe,
     keyframes: &Keyframes,
 ) -> Result<Vec<Option<PointCloud>>, String> {
     let (keys, seed) = (&keyframes.keys, recipe.training.seed);
     let mut found = vec![None; keys.len()];
+    // Arranging a shape takes long and much memory: those of the interval before are kept, if they are there.
+    let mut last: [(usize, Option<Arc<Solid>>); 2] = Default::default();
     for k in (0..keys.len()).filter(|k| !encloses(&keys[*k]) && is_wanted(*k)) {
         let s = neighbour(keys, k).min(k);
-        let solid = |k: usize| SolidParts::of(&keys[k]).and_then(Solid::new).map(Arc::new);
-        let (Some(first), Some(second)) = (solid(s), solid(s + 1)) else {
+        let solid = |k: usize| {
+            let known = last
+                .iter()
+                .find(|(own, solid)| *own == k && solid.is_some());
+            let made = || parts(k).and_then(Solid::new).map(Arc::new);
+            known.map_or_else(made, |(_, solid)| solid.clone())
+        };
+        last = [s, s + 1].map(|k| (k, solid(k)));
+        let [(_, Some(first)), (_, Some(second))] = &last else {
             continue;
         };
-        let shapes = [first, second];
+        let shapes = [first.clone(), second.clone()];
         found[k] = if keys[k].sheet.is_some() {
             thicken(&keys[k], k, &shapes[k - s], seed)
         } else {
@@ -96,6 +77,11 @@ fn completed_where<const H: usize>(
         };
     }
     Ok(found)
+}
+
+/// Whether a key frame is known in part, and a neighbour is whole.
+pub(super) fn has_whole_neighbour(keys: &[Keyframe], k: usize) -> bool {
+    !keys[k].border.is_empty() && keys[k].sheet.is_none() && encloses(&keys[neighbour(keys, k)])
 }
 
 /// The neighbour that completes key frame `k`: one that is known itself, the next one if both are.

@@ -12,7 +12,7 @@ use super::completed::completed;
 use super::motion::Field;
 use super::problem::{options, solver};
 use crate::recipe::{Recipe, RecipeError};
-use crate::shape::{Keyframes, PointCloud};
+use crate::shape::{Keyframes, PointCloud, SolidParts};
 
 /// A solved field between two shapes, and in how many steps its paths are followed.
 struct SplineGuide {
@@ -182,16 +182,17 @@ pub(crate) fn guide(recipe: &Recipe, keyframes: &Keyframes) -> Result<Guidance, 
         }
         Ok(solver.field())
     })();
+    let parts = |k: usize| SolidParts::of(&keyframes.keys[k]);
     match found.map_err(|error| error.to_string())? {
         Field::Pair(field) => Ok(Guidance {
-            completed: completed(|_| field.clone(), recipe, keyframes)?,
+            completed: completed(|_| true, parts, |_| field.clone(), recipe, keyframes)?,
             guide: Arc::new(SplineGuide {
                 field,
                 trajectory_steps,
             }),
         }),
         Field::Sequence(field) => Ok(Guidance {
-            completed: completed(|s| field.part(s), recipe, keyframes)?,
+            completed: completed(|_| true, parts, |s| field.part(s), recipe, keyframes)?,
             guide: Arc::new(SequenceGuide {
                 times: KeyTimes::new(field.times().to_vec()),
                 field,

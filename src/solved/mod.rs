@@ -42,6 +42,7 @@ use rayon::prelude::*;
 pub(crate) use self::arrays::arrays;
 use self::carried::CarriedShapes;
 pub(crate) use self::completed::encloses;
+use self::completed::{completed, has_whole_neighbour};
 pub(crate) use self::guide::{Guidance, guide, sheet_thickness};
 use self::motion::{AnySolver, Field};
 use self::shapes::Shapes;
@@ -90,7 +91,7 @@ impl Solved {
             motion: Motion::Sought(solver),
             step: 0,
             shapes: Some(shapes),
-            partial: completed::is_any_completed(&keyframes.keys)
+            partial: (count > 2 && (0..count).any(|k| has_whole_neighbour(&keyframes.keys, k)))
                 .then(|| Box::new((recipe.clone(), keyframes.clone()))),
         })
     }
@@ -115,14 +116,17 @@ impl Solved {
 
     /// Completes key frames in the midst of others that are known in part, once the motion is found.
     fn complete(&mut self) {
-        let (Some(of), Field::Sequence(field)) = (&self.partial, self.field()) else {
+        let Some(of) = &self.partial else { return };
+        let Field::Sequence(field) = self.field() else {
             return;
         };
         let (recipe, keyframes) = &**of;
-        let part = |s: usize| field.part(s);
-        // A surface that is not found leaves the shape as it is: known in part.
-        let found = completed::of_whole_neighbours(part, recipe, keyframes).unwrap_or_default();
         let mut parts: Vec<SolidParts> = self.shapes().parts().into_iter().cloned().collect();
+        // Splines blend two that are known in part.
+        let is_wanted = |k: usize| has_whole_neighbour(&keyframes.keys, k);
+        let (known, part) = (|k: usize| Some(parts[k].clone()), |s: usize| field.part(s));
+        // A surface that is not found leaves the shape as it is: known in part.
+        let found = completed(is_wanted, known, part, recipe, keyframes).unwrap_or_default();
         for (parts, cloud) in parts.iter_mut().zip(found) {
             if let Some(whole) = cloud.and_then(|cloud| SolidParts::of_cloud(&cloud)) {
                 *parts = whole;

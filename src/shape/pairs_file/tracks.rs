@@ -1,6 +1,6 @@
 //! Points that are known in many key frames: a column for each key frame.
 
-use super::{Array, Layout, are_names, fields, lines, whole_number};
+use super::{Array, Heading, Layout, lines, whole_number};
 
 /// What a line must be.
 pub(super) const ALLOWED: &str =
@@ -19,6 +19,9 @@ pub(super) fn columns(layout: Layout, rows: impl FnOnce() -> (usize, bool)) -> O
     let Layout::Tracks { k, key_frames } = layout else {
         return None;
     };
+    if key_frames < 3 {
+        return None;
+    }
     let (width, is_no_confidence) = rows();
     let is_one_for_each = width == key_frames && (width > 3 || width == 3 && is_no_confidence);
     is_one_for_each.then_some(Columns {
@@ -29,14 +32,11 @@ pub(super) fn columns(layout: Layout, rows: impl FnOnce() -> (usize, bool)) -> O
 
 /// Of text: the columns of its first line of numbers, and whether any line has a third one that no confidence is.
 pub(super) fn rows_of_text(bytes: &[u8]) -> (usize, bool) {
-    let (mut width, mut found) = (0, false);
-    let numbers = lines(bytes).filter(|(_, line)| !line.starts_with('#'));
-    for (at, (_, line)) in numbers.enumerate() {
-        let fields: Vec<&str> = fields(&line).collect();
-        if at == 0 && are_names(&fields) {
-            // As many names as columns, with one for an index that has none.
+    let (mut width, mut found, mut heading) = (0, false, Heading::default());
+    for (_, line) in lines(bytes).filter(|(_, line)| !line.starts_with('#')) {
+        let Some(fields) = heading.fields_below(&line) else {
             continue;
-        }
+        };
         if width == 0 {
             width = fields.len();
         }
@@ -138,7 +138,10 @@ mod tests {
         let text = "a,b,c,d\n# a comment\n0,1,2,3\n4,-1,5,6\n7,8,,nan\n";
         let found = read(text, &[9, 9, 9, 9]);
         let wanted = [vec![[0, 1], [7, 8]], vec![[1, 2]], vec![[2, 3], [5, 6]]];
-        assert_eq!(found, wanted.map(Ok));
+        assert_eq!(found, wanted.clone().map(Ok));
+        // With an index, as pandas writes it.
+        let text = ",a,b,c,d\n0,0,1,2,3\n1,4,-1,5,6\n2,7,8,,nan\n";
+        assert_eq!(read(text, &[9, 9, 9, 9]), wanted.map(Ok));
     }
 
     #[test]
