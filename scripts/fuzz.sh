@@ -37,7 +37,10 @@ for target in $targets; do
     if grep -q '^failed$' "$logs/$target"; then
         result=FAILED
         failed=1
-        tail -40 "$logs/$target" >&2
+        # What failed first, then what the fuzzer says of it.
+        grep -m1 -A2 'panicked at' "$logs/$target" >&2 || true
+        grep -o 'at /work.*\|at .*/main/.*' "$logs/$target" | head -10 >&2 || true
+        tail -12 "$logs/$target" >&2
     fi
     printf '| %s | %s | %s |\n' "$target" "${count:-0}" "$result"
 done

@@ -23,6 +23,7 @@
 //! | `optimiser.rs` | Adam with a limited gradient |
 //! | `weights.rs` | networks as plain arrays, for other programs |
 //! | `records.rs` | networks and optimiser states as bytes |
+//! | `alike.rs` | whether such bytes are of the recipe's network |
 //! | `engine.rs` | the border to training: a backend without its type |
 //! | `probe.rs` | the operations of a run in small, to compare a device with another |
 //! | `deformation.rs` | the border to what was trained: values and motion of points on the host |
@@ -38,6 +39,7 @@
 // The thrice lifted autodiff types nest deeper than the default limit allows.
 #![recursion_limit = "256"]
 
+mod alike;
 pub mod data;
 pub mod deformation;
 pub mod engine;

@@ -91,17 +91,18 @@ impl<B: TrainBackend, M: AutodiffModule<B>> Optimiser<B, M> {
         }
     }
 
-    /// Takes the states of a network of this name.
+    /// Takes the states of a network of this name; `net` is the name of its record.
     pub(crate) fn restore(
         &mut self,
         name: &str,
+        net: &str,
         records: &Records,
         device: &B::Device,
     ) -> Result<(), RecordError> {
-        let adam = records.get::<B, _>(&adam_file(name), device)?;
+        let adam = records.states::<B, _>(&adam_file(name), net, device)?;
         self.adam = fresh_adam::<B, M>().load_record(adam);
         if let Some(hidden) = &mut self.muon {
-            let muon = records.get::<B, _>(&muon_file(name), device)?;
+            let muon = records.states::<B, _>(&muon_file(name), net, device)?;
             hidden.muon = fresh_muon::<B, M>().load_record(muon);
         }
         Ok(())

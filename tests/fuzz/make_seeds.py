@@ -1,9 +1,11 @@
 #!/usr/bin/env python3
 """Writes the seeds of the fuzz targets: small valid files of each kind.
 
-    python3 tests/fuzz/make_seeds.py RUN
+    python3 tests/fuzz/make_seeds.py NETWORK SOLVED
 
-RUN is the folder of a small run, whose recipe, metrics and checkpoint become seeds. Needs numpy.
+NETWORK and SOLVED are the folders of two small runs of two steps, with networks of 2 layers of 8 units and with
+splines of a coarse grid. The recipe, metrics and state of the first and the checkpoints of both become seeds. The
+target `checkpoint` has their files in it, from tests/fuzz/runs. Needs numpy.
 """
 
 import io
@@ -16,6 +18,7 @@ from pathlib import Path
 import numpy as np
 
 SEEDS = Path(__file__).parent / "seeds"
+RUNS = Path(__file__).parent / "runs"
 VERTICES = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0.5, 0.5, 1)]
 FACES = [(0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)]
 TRIANGLES = [(0, 3, 2), (0, 2, 1), *FACES[1:]]
@@ -161,20 +164,43 @@ def recipe(root):
         write("recipe", f"{path.parent.name}-{path.name}", path.read_bytes())
 
 
+def cleaned(folder, file):
+    """The content of a file in a run, without a path of a machine."""
+    return file.read_bytes().replace(str(folder.parent.resolve()).encode(), b"/place")
+
+
+def newest(folder):
+    return sorted((folder / "checkpoints").iterdir())[-1]
+
+
 def run(folder):
     metrics = (folder / "metrics.jsonl").read_bytes().splitlines(keepends=True)[:2]
-    state = sorted((folder / "checkpoints").iterdir())[-1] / "state.json"
-    # No path of a machine.
-    clean = lambda text: text.replace(str(folder.parent.resolve()).encode(), b"/place")
-    stored = clean((folder / "recipe.toml").read_bytes())
+    stored = cleaned(folder, folder / "recipe.toml")
+    state = cleaned(folder, newest(folder) / "state.json")
     write("recipe", "stored.toml", stored)
-    write("run", "whole", stored + b"\0" + b"".join(metrics) + b"\0" + clean(state.read_bytes()))
+    write("run", "whole", stored + b"\0" + b"".join(metrics) + b"\0" + state)
+
+
+def checkpoints(folders):
+    """Their files, and a seed of each: its place among all, as in the target, and its content."""
+    place = 0
+    for name, folder in folders.items():
+        kept = RUNS / name
+        kept.mkdir(parents=True, exist_ok=True)
+        for file in (folder / "recipe.toml", newest(folder) / "state.json"):
+            (kept / file.name).write_bytes(cleaned(folder, file))
+        for file in sorted(newest(folder).glob("*.mpk")):
+            (kept / file.name).write_bytes(file.read_bytes())
+            write("checkpoint", f"{name}-{file.stem}", bytes([place]) + file.read_bytes())
+            place += 1
 
 
 def main():
     ply(), obj(), off(), stl(), xyz(), npy(), glb(), anime(), pairs()
     recipe(Path(__file__).parents[2])
-    run(Path(sys.argv[1]))
+    network, solved = map(Path, sys.argv[1:3])
+    run(network)
+    checkpoints({"network": network, "solved": solved})
 
 
 if __name__ == "__main__":

@@ -346,8 +346,16 @@ impl<B: TrainBackend, M: AutodiffModule<B>> Trainee<B, M> {
 
     /// Takes both from records.
     pub(crate) fn restore(&mut self, records: &Records) -> Result<(), RecordError> {
-        let net = records.get::<B, M::Record>(&self.file(), &self.device)?;
-        self.optimiser.restore(&self.name, records, &self.device)?;
+        let file = self.file();
+        let mut own = Records::default();
+        own.push::<B>(file.clone(), self.net.clone().into_record())
+            .map_err(|error| RecordError {
+                file: file.clone(),
+                problem: error.to_string(),
+            })?;
+        let net = records.get::<B, M::Record>(&file, &own, &self.device)?;
+        self.optimiser
+            .restore(&self.name, &file, records, &self.device)?;
         self.net = self.net.clone().load_record(net);
         Ok(())
     }

@@ -4,43 +4,52 @@ use isomorph::{Backend, Trained};
 use isomorph_fuzz::written;
 use serde_json::Value;
 
-/// The files of a small run.
+/// A small run: its recipe, and the state and the records of its checkpoint.
 struct Stored {
     recipe: &'static str,
     state: &'static str,
-    velocity: &'static [u8],
-    ends: &'static [u8],
+    records: &'static [(&'static str, &'static [u8])],
+}
+
+/// The stored run of a name with the records of these names.
+macro_rules! stored {
+    ($run:literal: $($name:literal)*) => {
+        Stored {
+            recipe: include_str!(concat!("../runs/", $run, "/recipe.toml")),
+            state: include_str!(concat!("../runs/", $run, "/state.json")),
+            records: &[$((
+                concat!($name, ".mpk"),
+                include_bytes!(concat!("../runs/", $run, "/", $name, ".mpk")),
+            )),*],
+        }
+    };
 }
 
 const RUNS: [Stored; 2] = [
-    Stored {
-        recipe: include_str!("../runs/network/recipe.toml"),
-        state: include_str!("../runs/network/state.json"),
-        velocity: include_bytes!("../runs/network/velocity.mpk"),
-        ends: include_bytes!("../runs/network/ends.mpk"),
-    },
-    Stored {
-        recipe: include_str!("../runs/solved/recipe.toml"),
-        state: include_str!("../runs/solved/state.json"),
-        velocity: include_bytes!("../runs/solved/velocity.mpk"),
-        ends: include_bytes!("../runs/solved/ends.mpk"),
-    },
+    stored!("network": "ends-muon-optimiser" "ends-optimiser" "ends" "velocity-muon-optimiser"
+        "velocity-optimiser" "velocity"),
+    stored!("solved": "ends" "velocity"),
 ];
 
-// The first byte chooses the run and the file in it that the others are. Its checksum is right: this is no damage
-// by chance.
+// The first byte chooses the record that the others are. Its checksum is right: this is no damage by chance.
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
-    let Some((which, bytes)) = bytes.split_first() else {
+    let Some((place, bytes)) = bytes.split_first() else {
         return;
     };
-    let run = &RUNS[usize::from(which >> 1) % 2];
-    let (velocity, ends) = match which & 1 {
-        0 => (bytes, run.ends),
-        _ => (run.velocity, bytes),
+    let all: usize = RUNS.iter().map(|run| run.records.len()).sum();
+    let mut place = usize::from(*place) % all;
+    let mut runs = RUNS.iter();
+    let run = loop {
+        let run = runs.next().expect("the place is below the sum");
+        match place.checked_sub(run.records.len()) {
+            Some(rest) => place = rest,
+            None => break run,
+        }
     };
-    let folder = "run/checkpoints/step-000020";
+    let folder = "run/checkpoints/step-000002";
     let mut state: Value = serde_json::from_str(run.state).expect("JSON");
-    for (name, content) in [("velocity.mpk", velocity), ("ends.mpk", ends)] {
+    for (k, (name, content)) in run.records.iter().enumerate() {
+        let content = if k == place { bytes } else { *content };
         let digest = serde_json::json!({"bytes": content.len(), "crc32": crc32fast::hash(content)});
         state["files"][name] = digest;
         written(&format!("{folder}/{name}"), content);
@@ -50,8 +59,8 @@ libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
         state.to_string().as_bytes(),
     );
     let recipe = written("run/recipe.toml", run.recipe.as_bytes());
-    let place = recipe.parent().expect("it lies in a folder");
-    match Trained::open(place, Backend::Ndarray) {
+    let folder = recipe.parent().expect("it lies in a folder");
+    match Trained::open(folder, Backend::Ndarray) {
         Err(error) => isomorph_fuzz::one_line(&error.to_string(), ".mpk"),
         Ok(trained) => {
             // Whatever numbers it holds: no panic, and one value for each point.
