@@ -54,6 +54,7 @@ fn problem() -> Problem {
             target: target[..100].to_vec(),
             // They change what a step minimises, and not the terms that are reported.
             confidence: (0..100).map(|k| k as f32 / 99.0).collect(),
+            found: false,
         },
         shapes: [
             Cloud {

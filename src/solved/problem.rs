@@ -7,11 +7,28 @@ use isomorph_spline::{
 use isomorph_training::method::spline;
 
 use super::motion::AnySolver;
-use crate::recipe::{Motion, Recipe};
+use crate::recipe::{Correspondences, Motion, Recipe};
 use crate::shape::Keyframes;
 
 /// Least weight of the strain: without any the field would be free between the samples.
 const LEAST_STRAIN: f64 = 1e-3;
+
+/// Where the surfaces alone decide through many key frames: samples of each, over `spline.surface-samples`. The error of
+/// carried points falls with their number, as does the noise of the samples.
+const SAMPLES_ALONE: usize = 12;
+
+/// The least of these samples, and the most over all intervals: each takes memory.
+const LEAST_ALONE: usize = 1000;
+const MOST_ALONE: usize = 180_000;
+
+/// The same for the samples of the band, over `spline.band`.
+const BAND_ALONE: usize = 3;
+
+/// Through many key frames, [`Options::robust_start`].
+const ROBUST_START: f64 = 30.0;
+
+/// Through many key frames, [`Options::found_share`].
+const FOUND_SHARE: f64 = 0.0;
 
 /// The solver of a recipe, before its first step.
 ///
@@ -41,8 +58,31 @@ pub(super) fn solver(recipe: &Recipe, keyframes: &Keyframes) -> Result<AnySolver
             .map(|k| pairs(recipe, keyframes, k))
             .collect(),
     };
+    let options = alone(options, &weights, &problem.pairs);
     let solver = SequenceSolver::new(problem, weights, options)?;
     Ok(AnySolver::Sequence(Box::new(solver)))
+}
+
+/// The options of one field through many key frames: what differs where pairs are found, or there are none.
+fn alone(options: Options, weights: &Weights, between: &[Pairs]) -> Options {
+    let is_alone = |pairs: &Pairs| pairs.found || pairs.source.is_empty();
+    let band = match between.iter().all(is_alone) {
+        true => BAND_ALONE * options.band,
+        false => options.band,
+    };
+    let most = (MOST_ALONE / between.len()).max(LEAST_ALONE);
+    Options {
+        band,
+        surface_samples_alone: most.min(SAMPLES_ALONE * options.surface_samples),
+        robust_start: ROBUST_START,
+        // Without the term of surfaces nothing but pairs says where they go.
+        found_share: if weights.on_surface > 0.0 {
+            FOUND_SHARE
+        } else {
+            1.0
+        },
+        ..options
+    }
 }
 
 /// The problem of key frame `k` and the next.
@@ -76,6 +116,7 @@ fn pairs(recipe: &Recipe, keyframes: &Keyframes, k: usize) -> Pairs {
         source,
         target,
         confidence: confidence.iter().step_by(apart).copied().collect(),
+        found: recipe.data.between[k] == Correspondences::Match,
     }
 }
 

@@ -1,5 +1,6 @@
 //! Solved fields as the rest of the program sees them: trained, stored, resumed, extracted.
 
+mod found;
 mod partial;
 
 use isomorph_training::engine::Trainer;

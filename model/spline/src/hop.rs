@@ -81,7 +81,15 @@ impl<R: Real> Hop<R> {
             merge,
         } = pass;
         let not_finite = |what| SplineError::NotFinite { step, what };
-        let weights = &self.weights;
+        let share = options.share_of_pairs(&self.pairs, level);
+        let weights = &Weights {
+            matching: share * self.weights.matching,
+            ..self.weights
+        };
+        let robust = match self.pairs.source.is_empty() {
+            true => options.robust_alone(step),
+            false => options.robust_scale,
+        };
         let targets = Targets::new(&self.shapes, &self.pairs, options, weights, draw);
         let steps = self.trajectory_steps(field, options);
         let ends = Ends::new(field, &targets.starts, &targets.times, steps, merge);
@@ -89,7 +97,7 @@ impl<R: Real> Hop<R> {
         if !ends.points.iter().flatten().all(finite) {
             return Err(not_finite("the end of a trajectory"));
         }
-        let residuals = targets.residuals(&ends, &self.surfaces, weights, options.robust_scale);
+        let residuals = targets.residuals(&ends, &self.surfaces, weights, robust);
         let mut terms = Terms {
             matching: residuals.matching,
             on_surface: residuals.on_surface,

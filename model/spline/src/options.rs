@@ -2,6 +2,7 @@
 
 use crate::basis::TimeBasis;
 use crate::error::SplineError;
+use crate::problem::Pairs;
 
 /// What each term counts in the objective. Each term is a mean.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,10 +57,16 @@ pub struct Options {
     pub extension: f64,
     /// Samples of each surface for the on-surface term.
     pub surface_samples: usize,
-    /// The same where there are no pairs.
+    /// The same where the surfaces alone decide: there are no pairs, or they were found and count for less.
     pub surface_samples_alone: usize,
     /// Distance below which matching and on-surface count by their squares.
     pub robust_scale: f64,
+    /// Factor of `robust_scale` at the first step where there are no pairs. It falls to 1 until the last level: parts
+    /// that are far off count fully at first.
+    pub robust_start: f64,
+    /// The share of their weight that pairs keep at the last level if they were found, not given. Below 1 the surfaces
+    /// have the last word: found pairs are off by half of the spacing of the points.
+    pub found_share: f64,
     /// Most iterations of conjugate gradients in a step.
     pub iterations: usize,
     /// The part of the residual at which conjugate gradients end.
@@ -86,6 +93,8 @@ impl Default for Options {
             surface_samples: 300,
             surface_samples_alone: 1000,
             robust_scale: 0.003,
+            robust_start: 1.0,
+            found_share: 1.0,
             iterations: 80,
             tolerance: 0.03,
             ridge: 1e-4,
@@ -120,6 +129,8 @@ impl Options {
         positive("spacing", self.spacing)?;
         positive("voxel", self.voxel)?;
         positive("robust_scale", self.robust_scale)?;
+        positive("robust_start", self.robust_start)?;
+        not_negative("found_share", self.found_share)?;
         positive("ridge", self.ridge)?;
         not_negative("extension", self.extension)?;
         let widths = self.band_spread.len();
@@ -166,6 +177,22 @@ impl Options {
             self.band
         } else {
             self.band.div_ceil(2)
+        }
+    }
+
+    /// The distance below which residuals of surfaces without pairs count by their squares in a step.
+    pub(crate) fn robust_alone(&self, step: usize) -> f64 {
+        let before_last: usize = self.steps[..self.steps.len() - 1].iter().sum();
+        let left = 1.0 - step as f64 / before_last.max(1) as f64;
+        self.robust_scale * self.robust_start.powf(left.max(0.0))
+    }
+
+    /// The share of its weight that a pair has at a level. Found pairs lead at one level at least.
+    pub(crate) fn share_of_pairs(&self, pairs: &Pairs, level: usize) -> f64 {
+        if pairs.found && level > 0 && level + 1 == self.steps.len() {
+            self.found_share
+        } else {
+            1.0
         }
     }
 

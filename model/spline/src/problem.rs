@@ -23,6 +23,8 @@ pub struct Pairs {
     pub target: Vec<[f32; 3]>,
     /// A factor of each pair's weight, 0 or more; empty: 1 for all.
     pub confidence: Vec<f32>,
+    /// Whether they were found by the shapes' likeness, and are not given.
+    pub found: bool,
 }
 
 /// What a field is sought for.

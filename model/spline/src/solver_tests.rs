@@ -35,7 +35,7 @@ pub(crate) fn ellipsoid(count: usize, pairs: usize) -> Problem {
         pairs: Pairs {
             source: source[..pairs].to_vec(),
             target: target[..pairs].to_vec(),
-            confidence: Vec::new(),
+            ..Pairs::default()
         },
         shapes: [
             Cloud {
@@ -305,6 +305,7 @@ fn odd_shapes_give_finite_fields() {
                 source: shapes[0].points[..pairs].to_vec(),
                 target: shapes[1].points[..pairs].to_vec(),
                 confidence: vec![0.0; pairs],
+                found: false,
             };
             let (field, report) = solve(Problem { shapes, pairs }, quick()).expect("finite");
             assert!(are_finite(&field.nodes) && report.size.is_finite());

@@ -108,7 +108,8 @@ impl<R: Real> Targets<R> {
             }
         }
         if weights.on_surface > 0.0 {
-            let most = if pairs.source.is_empty() {
+            let found = pairs.found && options.found_share < 1.0;
+            let most = if pairs.source.is_empty() || found {
                 options.surface_samples_alone
             } else {
                 options.surface_samples

@@ -38,7 +38,7 @@ fn moving(times: &[f64], motion: impl Fn([f32; 3], f64) -> [f32; 3]) -> Sequence
             .map(|two| Pairs {
                 source: known(two[0]),
                 target: known(two[1]),
-                confidence: Vec::new(),
+                ..Pairs::default()
             })
             .collect(),
         times: times.to_vec(),
@@ -234,6 +234,68 @@ fn an_accelerated_motion_is_found_that_pairs_cannot_see() {
         together < 0.3 * apart,
         "one field: {together}, pairs alone: {apart}"
     );
+}
+
+/// The largest error of carried points half-way through the second interval of a screw through four key frames.
+fn half_way(change: impl Fn(&mut Pairs), options: Options) -> f64 {
+    let times = [0.0, 1.0, 2.0, 3.0];
+    let mut problem = moving(&times, screw);
+    problem.pairs.iter_mut().for_each(change);
+    let start = problem.shapes[1].points[..300].to_vec();
+    let field = solve(problem, options).expect("finite");
+    let [_, shape] = ellipsoid(3000, 1).shapes;
+    let points = shape.points[..300].iter();
+    let between: Vec<[f32; 3]> = points.map(|&x| screw(x, 1.5)).collect();
+    error(&field, 1, 0.5, &start, &between)
+}
+
+#[test]
+fn found_pairs_lead_and_the_surfaces_have_the_last_word() {
+    // As matching leaves them: off by the spacing of the points, all to one side.
+    let found = |pairs: &mut Pairs| {
+        pairs.found = true;
+        for target in &mut pairs.target {
+            target[0] += 0.02;
+        }
+    };
+    let options = |found_share| Options {
+        steps: vec![6, 4],
+        surface_samples_alone: 1000,
+        found_share,
+        ..options()
+    };
+    let (bound, free) = (half_way(found, options(1.0)), half_way(found, options(0.0)));
+    assert!(bound > 0.008, "pairs count throughout: {bound}");
+    assert!(free < 0.5 * bound, "{free} instead of {bound}");
+    // A single level is led by them.
+    let single = Options {
+        steps: vec![10],
+        ..options(0.0)
+    };
+    let led = half_way(found, single);
+    assert!(led > 0.008, "one level: {led}");
+    // Given pairs are kept, whatever the share.
+    let given = |pairs: &mut Pairs| {
+        found(pairs);
+        pairs.found = false;
+    };
+    assert_eq!(half_way(given, options(0.0)), half_way(given, options(1.0)));
+}
+
+#[test]
+fn surfaces_without_pairs_arrive_sooner_if_distances_count_by_squares_at_first() {
+    let options = |robust_start| Options {
+        steps: vec![4, 2],
+        surface_samples_alone: 1000,
+        robust_start,
+        ..options()
+    };
+    let none = |pairs: &mut Pairs| *pairs = Pairs::default();
+    let (plain, eased) = (half_way(none, options(1.0)), half_way(none, options(30.0)));
+    assert!(eased < 0.5 * plain, "{eased} instead of {plain}");
+    // With pairs nothing differs.
+    let keep = |_: &mut Pairs| {};
+    assert_eq!(half_way(keep, options(30.0)), half_way(keep, options(1.0)));
 }
 
 #[test]
