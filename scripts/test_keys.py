@@ -4,6 +4,7 @@
 import contextlib
 import io
 import json
+import shutil
 import sys
 import tempfile
 import unittest
@@ -69,8 +70,8 @@ class Keys(unittest.TestCase):
         self.assertEqual(status, 0, err)
         folder = self.folder / "out/keys"
         content = json.loads((folder / "data.json").read_text())
-        # Two seeds and the pairs of three sequences, and three rows of 14 key frames on one of them.
-        self.assertEqual(len(content["rows"]), 3 * 3 + 3)
+        # Two seeds and the pairs of three sequences, and three rows of 14 key frames on two of them.
+        self.assertEqual(len(content["rows"]), 3 * 3 + 6)
         table = (folder / "table.md").read_text()
         self.assertIn("| bear_walk | one field | 2 | 2.5 | 0.100 | 0.25 | 1.000 | 0.400 |", table)
         # Six runs of a pair, each with its seconds.
@@ -92,14 +93,27 @@ class Keys(unittest.TestCase):
         self.assertEqual(status, 0, err)
         folder = self.folder / "out/keys"
         content = json.loads((folder / "data.json").read_text())
-        self.assertEqual(len(content["rows"]), 3 * 2 + 3 + 3 * 2)
+        self.assertEqual(len(content["rows"]), 3 * 2 + 6 + 3 * 2)
         table = (folder / "table.md").read_text()
         self.assertIn("| bear_walk | one field | 1 | 2.5 | 0.100 |", table)
         self.assertIn("| bear_walk | networks (`default`) | 2 | 2.5 | 0.300 | 0.75 |", table)
         self.assertIn("Networks: made by `scripts/keys.py --networks --seeds 2", table)
         # Measured again, they take the place of those before.
         self.run_script("--networks", "--seeds", "1")
-        self.assertEqual(len(json.loads((folder / "data.json").read_text())["rows"]), 3 * 2 + 3 + 3)
+        self.assertEqual(len(json.loads((folder / "data.json").read_text())["rows"]), 3 * 2 + 6 + 3)
+
+    def test_rows_of_14_key_frames_are_measured_alone(self):
+        self.run_script("--seeds", "1")
+        shutil.rmtree(self.folder / "work")
+        self.binary.write_text(self.binary.read_text().replace("else 0.002", "else 0.006"))
+        status, err = self.run_script("--many")
+        self.assertEqual(status, 0, err)
+        folder = self.folder / "out/keys"
+        self.assertEqual(len(json.loads((folder / "data.json").read_text())["rows"]), 3 * 2 + 6)
+        table = (folder / "table.md").read_text()
+        self.assertIn("| bear_walk | one field | 1 | 2.5 | 0.100 |", table)
+        self.assertIn("| bear_walk | 14 keys, clouds, match | 2.5 | 0.600 | 1.00 |", table)
+        self.assertIn("Made by `scripts/keys.py --many", table)
 
     def test_clouds_are_sampled_anew_at_each_key_frame_on_its_surface(self):
         options = keys.arguments(["--work", str(self.folder)])

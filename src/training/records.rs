@@ -303,7 +303,7 @@ mod tests {
         assert_eq!(found, at("/id is no identifier"));
         let array = [&weight("param")[..], &["shape"]].concat();
         let found = problem("net.mpk", &array, |value| {
-            *value = Value::Array(vec![4.into()])
+            *value = Value::Array(vec![4.into()]);
         });
         assert_eq!(
             found,
@@ -311,15 +311,15 @@ mod tests {
         );
         let array = [&weight("param")[..], &["bytes"]].concat();
         let found = problem("net.mpk", &array, |value| {
-            *value = Value::Binary(vec![0; 8])
+            *value = Value::Binary(vec![0; 8]);
         });
         assert_eq!(found, at("/param holds too few or too many numbers"));
         let found = problem("net.mpk", &weight("param")[..5], |value| {
-            *value = Value::Map(vec![])
+            *value = Value::Map(vec![]);
         });
         assert_eq!(found, at("/id is missing"));
         let found = problem("net.mpk", &weight("param")[..3], |value| {
-            *value = Value::Array(vec![])
+            *value = Value::Array(vec![]);
         });
         assert_eq!(found, "mlp/layers is no list of 3");
     }
