@@ -19,6 +19,9 @@ const FAR: f32 = 0.06;
 /// The most nodes along an axis, for shapes that are much longer than wide.
 const MOST: usize = 200;
 
+/// The most nodes in all: a shape of far parts that would need more has no lattice, and exact distances everywhere.
+const MOST_IN_ALL: usize = 4_000_000;
+
 /// Signed distances at the nodes of a lattice around a shape.
 pub(super) struct FarField {
     low: [f32; 3],
@@ -33,9 +36,17 @@ impl FarField {
         let low = min.map(|x| x - AROUND);
         let nodes = [0, 1, 2].map(|axis| {
             let cells = (max[axis] + AROUND - low[axis]) / CELL;
-            (cells.ceil() as usize + 1).min(MOST)
+            // A conversion that saturates.
+            (cells.ceil() as usize).min(MOST - 1) + 1
         });
         let [nx, ny, nz] = nodes;
+        if nx * ny * nz > MOST_IN_ALL {
+            return Self {
+                low,
+                nodes: [1; 3],
+                values: Vec::new(),
+            };
+        }
         let mut places = Vec::with_capacity(nx * ny * nz);
         for z in 0..nz {
             for y in 0..ny {
@@ -111,5 +122,16 @@ mod tests {
         assert!(seen > 1000, "{seen}");
         assert_eq!(field.at([0.9, 0.0, 0.0]), None);
         assert_eq!(field.at([f32::NAN, 0.0, 0.0]), None);
+    }
+
+    #[test]
+    fn a_shape_without_bounds_to_speak_of_has_no_lattice() {
+        let none = |_: &[[f32; 3]]| -> Vec<f32> { panic!("no distance is measured") };
+        for far in [10.0, 1e30, f32::MAX] {
+            let field = FarField::new(&[[-far; 3], [far; 3]], none);
+            for x in [0.0, far, -far, f32::NAN] {
+                assert_eq!(field.at([x; 3]), None, "{x} of {far}");
+            }
+        }
     }
 }
