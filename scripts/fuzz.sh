@@ -39,7 +39,7 @@ for target in $targets; do
         failed=1
         # What failed first, then what the fuzzer says of it.
         grep -m1 -A2 'panicked at' "$logs/$target" >&2 || true
-        grep -o 'at /work.*\|at .*/main/.*' "$logs/$target" | head -10 >&2 || true
+        grep -E '^ +at ' "$logs/$target" | grep -v '/registry/\|/rustc/' | head -10 >&2 || true
         tail -12 "$logs/$target" >&2
     fi
     printf '| %s | %s | %s |\n' "$target" "${count:-0}" "$result"

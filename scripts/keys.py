@@ -24,6 +24,7 @@ import argparse
 import json
 import shlex
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -137,25 +138,29 @@ def many(bench: "Bench") -> list[dict]:
 
 def with_many(content: dict, options: argparse.Namespace, command: str) -> dict:
     """The same with new rows of 14 key frames, and how these were measured."""
-    place = command_line.sequences(options)
-    options.samples = content["settings"]["samples"]
-    rows = [found for found in content["rows"] if found["variant"] not in (KNOWN, FOUND, NONE)]
-    for name in MANY:
-        rows += many(Bench(options, read_sequence(place / f"{name}.anime")))
-    return {**content, "rows": rows, "many": record.of(command, options.binary)}
+    return renewed(content, options, command, "many", MANY, (KNOWN, FOUND, NONE), many)
 
 
 def with_networks(content: dict, options: argparse.Namespace, command: str) -> dict:
     """The same with rows of networks, and how these were measured."""
+
+    def rows(bench: "Bench") -> list[dict]:
+        name = bench.sequence.name
+        return [row(name, NETWORKS, seed, [bench.run(KEYS, seed, preset="default")]) for seed in range(options.seeds)]
+
+    return renewed(content, options, command, "networks", SEQUENCES, (NETWORKS,), rows)
+
+
+def renewed(content: dict, options: argparse.Namespace, command: str, part: str, names: tuple[str, ...],
+            variants: tuple[str, ...], measure: Callable[["Bench"], list[dict]]) -> dict:
+    """The same with the rows of some variants measured anew on sequences of these names."""
     place = command_line.sequences(options)
     # As many as the other rows were measured with: what distances have of the noise of samples is the same.
     options.samples = content["settings"]["samples"]
-    rows = [found for found in content["rows"] if found["variant"] != NETWORKS]
-    for name in SEQUENCES:
-        bench = Bench(options, read_sequence(place / f"{name}.anime"))
-        for seed in range(options.seeds):
-            rows.append(row(name, NETWORKS, seed, [bench.run(KEYS, seed, preset="default")]))
-    return {**content, "rows": rows, "networks": record.of(command, options.binary)}
+    rows = [found for found in content["rows"] if found["variant"] not in variants]
+    for name in names:
+        rows += measure(Bench(options, read_sequence(place / f"{name}.anime")))
+    return {**content, "rows": rows, part: record.of(command, options.binary)}
 
 
 class Bench:

@@ -122,7 +122,7 @@ pub(super) fn read(records: &Records) -> Result<(Field, usize, Vec<SolidParts>),
     };
     if parts.len() != keys {
         let found = parts.len();
-        return Err(damaged(
+        return Err(RecordError::new(
             ENDS,
             format!("{found} shapes for {keys} key frames"),
         ));
@@ -132,38 +132,31 @@ pub(super) fn read(records: &Records) -> Result<(Field, usize, Vec<SolidParts>),
     if !ascend || (intervals > 1 && intervals + 1 != keys) {
         let problem =
             format!("{intervals} fields for {keys} key frames, or times that do not ascend");
-        return Err(damaged(FIELD, problem));
+        return Err(RecordError::new(FIELD, problem));
     }
     let field = stored.field();
-    let field = field.map_err(|error| damaged(FIELD, error.to_string()))?;
+    let field = field.map_err(|error| RecordError::new(FIELD, error.to_string()))?;
     Ok((field, stored.step, parts))
 }
 
 /// A field that is not what the solver would have there.
 pub(super) fn misfit(error: &SplineError) -> RecordError {
-    damaged(FIELD, error.to_string())
+    RecordError::new(FIELD, error.to_string())
 }
 
 /// A field of another number of key frames than the run has.
 pub(super) fn other_kind() -> RecordError {
-    damaged(FIELD, "it is of another number of key frames".to_owned())
+    RecordError::new(FIELD, "it is of another number of key frames".to_owned())
 }
 
 /// The shapes of their parts.
 pub(super) fn shapes(parts: Vec<SolidParts>) -> Result<Shapes, RecordError> {
     let whole = Shapes::of(parts);
-    whole.map_err(|k| damaged(ENDS, format!("shape {k} does not fit together")))
+    whole.map_err(|k| RecordError::new(ENDS, format!("shape {k} does not fit together")))
 }
 
 fn one<T: DeserializeOwned>(records: &Records, file: &str) -> Result<T, RecordError> {
-    let found = records.0.iter().find(|(name, _)| name == file);
-    let (_, bytes) = found.ok_or_else(|| damaged(file, "it is missing".to_owned()))?;
-    rmp_serde::from_slice(bytes).map_err(|error| damaged(file, error.to_string()))
-}
-
-fn damaged(file: &str, problem: String) -> RecordError {
-    RecordError {
-        file: file.to_owned(),
-        problem,
-    }
+    let found = records.bytes(file);
+    let bytes = found.ok_or_else(|| RecordError::new(file, "it is missing"))?;
+    rmp_serde::from_slice(bytes).map_err(|error| RecordError::new(file, error.to_string()))
 }

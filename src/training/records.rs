@@ -28,6 +28,16 @@ pub struct RecordError {
     pub problem: String,
 }
 
+impl RecordError {
+    /// Of a file and what is wrong with it.
+    pub fn new(file: &str, problem: impl Into<String>) -> Self {
+        Self {
+            file: file.to_owned(),
+            problem: problem.into(),
+        }
+    }
+}
+
 impl Records {
     /// Adds a record.
     ///
@@ -87,29 +97,27 @@ impl Records {
         device: &B::Device,
     ) -> Result<R, RecordError> {
         if let Some(problem) = problem {
-            return Err(refused(name, problem));
+            return Err(RecordError::new(name, problem));
         }
         let recorder = NamedMpkBytesRecorder::<FullPrecisionSettings>::default();
-        Recorder::<B>::load(&recorder, self.bytes(name)?.to_vec(), device)
-            .map_err(|error| refused(name, error.to_string()))
+        Recorder::<B>::load(&recorder, self.known(name)?.to_vec(), device)
+            .map_err(|error| RecordError::new(name, error.to_string()))
     }
 
-    fn bytes(&self, name: &str) -> Result<&[u8], RecordError> {
+    /// The bytes of a record, if it is there.
+    pub fn bytes(&self, name: &str) -> Option<&[u8]> {
         let found = self.0.iter().find(|(file, _)| file == name);
-        let (_, bytes) = found.ok_or_else(|| refused(name, "is not part of it".to_owned()))?;
-        Ok(bytes)
+        found.map(|(_, bytes)| bytes.as_slice())
+    }
+
+    fn known(&self, name: &str) -> Result<&[u8], RecordError> {
+        let missing = || RecordError::new(name, "is not part of it");
+        self.bytes(name).ok_or_else(missing)
     }
 
     fn value(&self, name: &str) -> Result<Value, RecordError> {
-        rmpv::decode::read_value(&mut self.bytes(name)?)
-            .map_err(|error| refused(name, error.to_string()))
-    }
-}
-
-fn refused(file: &str, problem: String) -> RecordError {
-    RecordError {
-        file: file.to_owned(),
-        problem,
+        rmpv::decode::read_value(&mut self.known(name)?)
+            .map_err(|error| RecordError::new(name, error.to_string()))
     }
 }
 

@@ -3,8 +3,8 @@
 
     python3 tests/fuzz/make_seeds.py NETWORK SOLVED
 
-NETWORK and SOLVED are the folders of two small runs of two steps, with networks of 2 layers of 8 units and with
-splines of a coarse grid. The recipe, metrics and state of the first and the checkpoints of both become seeds. The
+NETWORK and SOLVED are the folders of two small runs between two shapes, source.ply and target.ply beside them, by
+tests/fuzz/runs/network/recipe.toml and tests/fuzz/runs/solved/recipe.toml. The recipe, metrics and state of the first and the checkpoints of both become seeds. The
 target `checkpoint` has their files in it, from tests/fuzz/runs. Needs numpy.
 """
 

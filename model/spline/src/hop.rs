@@ -86,10 +86,7 @@ impl<R: Real> Hop<R> {
             matching: share * self.weights.matching,
             ..self.weights
         };
-        let robust = match self.pairs.source.is_empty() {
-            true => options.robust_alone(step),
-            false => options.robust_scale,
-        };
+        let robust = options.robust_beside(&self.pairs, step);
         let targets = Targets::new(&self.shapes, &self.pairs, options, weights, draw);
         let steps = self.trajectory_steps(field, options);
         let ends = Ends::new(field, &targets.starts, &targets.times, steps, merge);

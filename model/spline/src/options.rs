@@ -180,8 +180,20 @@ impl Options {
         }
     }
 
-    /// The distance below which residuals of surfaces without pairs count by their squares in a step.
-    pub(crate) fn robust_alone(&self, step: usize) -> f64 {
+    /// The samples of each surface between two shapes.
+    pub(crate) fn surface_samples_beside(&self, pairs: &Pairs) -> usize {
+        if pairs.source.is_empty() || pairs.found && self.found_share < 1.0 {
+            self.surface_samples_alone
+        } else {
+            self.surface_samples
+        }
+    }
+
+    /// The distance below which residuals count by their squares in a step.
+    pub(crate) fn robust_beside(&self, pairs: &Pairs, step: usize) -> f64 {
+        if !pairs.source.is_empty() {
+            return self.robust_scale;
+        }
         let before_last: usize = self.steps[..self.steps.len() - 1].iter().sum();
         let left = 1.0 - step as f64 / before_last.max(1) as f64;
         self.robust_scale * self.robust_start.powf(left.max(0.0))

@@ -108,12 +108,7 @@ impl<R: Real> Targets<R> {
             }
         }
         if weights.on_surface > 0.0 {
-            let found = pairs.found && options.found_share < 1.0;
-            let most = if pairs.source.is_empty() || found {
-                options.surface_samples_alone
-            } else {
-                options.surface_samples
-            };
+            let most = options.surface_samples_beside(pairs);
             for (end, cloud) in shapes.iter().enumerate() {
                 let mut rng = random(options.seed, step, Purpose::Surface, end);
                 let count = cloud.points.len();

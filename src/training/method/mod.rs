@@ -340,19 +340,20 @@ impl<B: TrainBackend, M: AutodiffModule<B>> Trainee<B, M> {
 
     /// Adds the records of network and optimiser.
     pub(crate) fn record(&self, records: &mut Records) -> io::Result<()> {
-        records.push::<B>(self.file(), self.net.clone().into_record())?;
+        self.record_net(records)?;
         self.optimiser.record(&self.name, records)
+    }
+
+    fn record_net(&self, records: &mut Records) -> io::Result<()> {
+        records.push::<B>(self.file(), self.net.clone().into_record())
     }
 
     /// Takes both from records.
     pub(crate) fn restore(&mut self, records: &Records) -> Result<(), RecordError> {
         let file = self.file();
         let mut own = Records::default();
-        own.push::<B>(file.clone(), self.net.clone().into_record())
-            .map_err(|error| RecordError {
-                file: file.clone(),
-                problem: error.to_string(),
-            })?;
+        self.record_net(&mut own)
+            .map_err(|error| RecordError::new(&file, error.to_string()))?;
         let net = records.get::<B, M::Record>(&file, &own, &self.device)?;
         self.optimiser
             .restore(&self.name, &file, records, &self.device)?;
