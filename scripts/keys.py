@@ -2,7 +2,7 @@
 """Measures motions through many key frames: the key frames that the authors of the paper name.
 
     python3 scripts/keys.py [--binary PATH] [--sequences DIR] [--seeds N] [--out DIR] [--work DIR]
-        [--networks | --many | --table]
+        [--networks | --many | --grown | --table]
 
 Frames 0, 10, 18, 28, 39, 47 and 54 of each sequence are given, with 1000 points that are known at
 all of them; all other frames are ground truth. `one field` is the preset `instant` through all key
@@ -10,8 +10,9 @@ frames, `pairs` the same preset on each two neighbours by themselves. Then 14 ke
 points, and as clouds that are sampled anew at each key frame, with pairs found by `match` or none.
 
 With --networks the preset `default` is trained through the seven key frames instead, which takes about
-five minutes for each sequence and seed. With --many only the 14 key frames are measured. Such rows are put
-beside those that are in DIR/keys already.
+five minutes for each sequence and seed. With --many only the 14 key frames are measured. With --grown the last of
+the seven key frames is appended to a run through the six before it (`isomorph resume`), with `instant` on all sequences
+and with `default` on the arms. Such rows are put beside those that are in DIR/keys already.
 
 The results go to DIR/keys: table.md, figure.svg, and data.json with all numbers, command, date,
 machine and version. What is in the work folder is not measured again. All of it takes about half an
@@ -49,6 +50,9 @@ MANY = ("human_raise_arms", "bear_walk")
 POINTS = 20_000
 
 ONE, PAIRS, NETWORKS = "one field", "pairs", "networks (`default`)"
+GROWN, GROWN_NETWORKS = "one field, last key frame appended", "networks (`default`), last key frame appended"
+# The sequence on which networks grow.
+GROWS = "human_raise_arms"
 KNOWN, FOUND, NONE = "14 keys", "14 keys, clouds, match", "14 keys, clouds, no pairs"
 
 # What is kept of what `evaluate` says: kind, metric.
@@ -72,6 +76,7 @@ def arguments(words: list[str]) -> argparse.Namespace:
     add("--out", type=Path, default=ROOT / "scripts/results", help="where results go")
     add("--networks", action="store_true", help="measure the preset default, and keep the other rows")
     add("--many", action="store_true", help="measure the 14 key frames, and keep the other rows")
+    add("--grown", action="store_true", help="measure runs to which a key frame is appended, and keep the other rows")
     command_line.add_table(parser)
     options = parser.parse_args(words)
     if not 1 <= options.seeds <= 100:
@@ -90,6 +95,9 @@ def main(words: list[str]) -> int:
             compact.write(folder / compact.NAME, content)
         elif options.many:
             content = with_many(compact.read(folder / compact.NAME), options, command)
+            compact.write(folder / compact.NAME, content)
+        elif options.grown:
+            content = with_grown(compact.read(folder / compact.NAME), options, command)
             compact.write(folder / compact.NAME, content)
         elif not options.table:
             content = measured(options, command)
@@ -151,6 +159,18 @@ def with_networks(content: dict, options: argparse.Namespace, command: str) -> d
     return renewed(content, options, command, "networks", SEQUENCES, (NETWORKS,), rows)
 
 
+def with_grown(content: dict, options: argparse.Namespace, command: str) -> dict:
+    """The same with rows of runs to which the last key frame is appended, and how these were measured."""
+
+    def rows(bench: "Bench") -> list[dict]:
+        name = bench.sequence.name
+        presets = ((GROWN, "instant"), (GROWN_NETWORKS, "default"))
+        return [row(name, label, 0, [bench.run(KEYS, 0, preset=preset, appended=True)])
+                for label, preset in presets if preset == "instant" or name == GROWS]
+
+    return renewed(content, options, command, "grown", SEQUENCES, (GROWN, GROWN_NETWORKS), rows)
+
+
 def renewed(content: dict, options: argparse.Namespace, command: str, part: str, names: tuple[str, ...],
             variants: tuple[str, ...], measure: Callable[["Bench"], list[dict]]) -> dict:
     """The same with the rows of some variants measured anew on sequences of these names."""
@@ -171,25 +191,32 @@ class Bench:
         self.sequence = sequence
         self.work = options.work / "keys" / sequence.name
 
-    def run(self, keys: tuple[int, ...], seed: int, pairs: str | None = None, preset: str = "instant") -> dict:
+    def run(self, keys: tuple[int, ...], seed: int, pairs: str | None = None, preset: str = "instant",
+            appended: bool = False) -> dict:
         """What `evaluate` says of a run through key frames, with the seconds of its training. pairs: of clouds that are
-        sampled anew; none for the true vertices.
+        sampled anew; none for the true vertices. appended: the last key frame is, to a run through the others; the
+        seconds are then those of what this takes.
         """
         names = [f"{len(keys)}-{keys[0]}-{keys[-1]}", f"seed-{seed}", pairs or "known"]
-        folder = self.work / "-".join(names if preset == "instant" else [*names, preset])
+        names += [preset] * (preset != "instant") + ["appended"] * appended
+        folder = self.work / "-".join(names)
         done = folder / "measured.json"
         if done.exists():
             return json.loads(done.read_text("utf-8"))
         recipe = folder / "recipe.toml"
-        write_atomically(recipe, self.recipe(keys, pairs, folder, preset).encode())
+        first = keys[:-1] if appended else keys
+        write_atomically(recipe, self.recipe(first, pairs, folder, preset).encode())
         run = folder / "run"
         binary = self.options.binary
         output([binary, "train", str(recipe), "--run", str(run), "--force", "--quiet", "--set",
                 f"training.seed={seed}", "--set", "result.frames=0"])
-        last = (run / "metrics.jsonl").read_text("utf-8").splitlines()[-1]
+        before = 0.0
+        if appended:
+            before = seconds(run)
+            output([binary, "resume", str(run), "--quiet", "--set", f"data.keys={list(keys)}"])
         found = answer([binary, "evaluate", str(run), "--ground-truth", str(self.sequence.path), "--json", "--quiet",
                         "--keys", ",".join(map(str, keys)), "--samples", str(self.options.samples)])
-        found["seconds"] = json.loads(last)["seconds"]
+        found["seconds"] = seconds(run) - before
         write_atomically(done, json.dumps(found).encode())
         return found
 
@@ -208,6 +235,11 @@ class Bench:
         vertices, triangles = self.sequence.frames[frame], self.sequence.triangles
         places = degrade.sampled(vertices, triangles, POINTS, rng)
         return places.on(vertices), unit(area_vectors(vertices, places.triangles))
+
+
+def seconds(run: Path) -> float:
+    """The seconds of all training of a run."""
+    return json.loads((run / "metrics.jsonl").read_text("utf-8").splitlines()[-1])["seconds"]
 
 
 def row(name: str, label: str, seed: int, found: list[dict]) -> dict:
@@ -250,6 +282,10 @@ def markdown(content: dict) -> str:
     if networks := content.get("networks"):
         labels.append(NETWORKS)
         made[-1] += f" Networks: made by {record.made_by({**content, **networks}).removeprefix('Made by ')}"
+    if grown := content.get("grown"):
+        labels += [GROWN, GROWN_NETWORKS]
+        made[-1] += (f" Last key frame appended: made by {record.made_by({**content, **grown}).removeprefix('Made by ')}"
+                     " The seconds are those of what the appended one takes.")
     keys = ", ".join(map(str, content["settings"]["keys"]))
     lines = [
         "# Motions through many key frames",
@@ -268,11 +304,14 @@ def markdown(content: dict) -> str:
     wide = []
     for name in SEQUENCES:
         for label in labels:
-            lines.append(line(content, name, label))
-            wide.append((label, of(content, name, label)))
+            if rows := of(content, name, label):
+                lines.append(line(content, name, label))
+                wide.append((label, rows))
     lines += ["", "Means of the three sequences, over `natural` for vertices and over `linear` for CD:", ""]
     for label in labels:
         mine = [rows for other, rows in wide if other == label]
+        if len(mine) < len(SEQUENCES):
+            continue
         ones = [rows for other, rows in wide if other == ONE]
         vertices = np.mean([mean(rows, "carried_rms") for rows in mine])
         natural = np.mean([mean(rows, "natural_rms") for rows in ones])

@@ -28,6 +28,11 @@ if words[0] == "train":
     os.makedirs(given("--run"), exist_ok=True)
     open(given("--run") + "/metrics.jsonl", "w").write('{{"step": 1, "seconds": 1.0}}\\n{{"step": 10, "seconds": 2.5}}\\n')
     sys.exit()
+if words[0] == "resume":
+    assert given("--set") == "data.keys=[0, 10, 18, 28, 39, 47, 54]"
+    assert "keys = [0, 10, 18, 28, 39, 47]\\n" in open(os.path.dirname(words[1]) + "/recipe.toml").read()
+    open(words[1] + "/metrics.jsonl", "a").write('{{"step": 20, "seconds": 4.0}}\\n')
+    sys.exit()
 frames = [int(key) for key in given("--keys").split(",")]
 # The error of carried vertices is a tenth of that of straight lines, and half of it at other numbers of key frames.
 carried = 0.001 if len(frames) == 7 else 0.002
@@ -101,6 +106,18 @@ class Keys(unittest.TestCase):
         # Measured again, they take the place of those before.
         self.run_script("--networks", "--seeds", "1")
         self.assertEqual(len(json.loads((folder / "data.json").read_text())["rows"]), 3 * 2 + 6 + 3)
+
+    def test_a_key_frame_is_appended_and_its_seconds_are_counted_alone(self):
+        self.run_script("--seeds", "1")
+        status, err = self.run_script("--grown")
+        self.assertEqual(status, 0, err)
+        table = (self.folder / "out/keys/table.md").read_text()
+        self.assertIn("| bear_walk | one field, last key frame appended | 1 | 1.5 | 0.100 | 0.25 |", table)
+        self.assertIn("| human_raise_arms | networks (`default`), last key frame appended | 1 | 1.5 | 0.300 |", table)
+        self.assertNotIn("| bear_walk | networks", table)
+        self.assertIn("* one field, last key frame appended: vertices 0.100, 0.25 of natural", table)
+        self.assertNotIn("* networks", table)
+        self.assertIn("Last key frame appended: made by `scripts/keys.py --grown", table)
 
     def test_rows_of_14_key_frames_are_measured_alone(self):
         self.run_script("--seeds", "1")

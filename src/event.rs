@@ -100,6 +100,8 @@ pub enum Event {
         done: usize,
         /// Steps of the stage.
         total: usize,
+        /// From which key frame to the next, counted from 0, and how often in all.
+        interval: [usize; 2],
     },
     /// Pairs of two shapes were found before training.
     Matched {
@@ -214,12 +216,29 @@ impl fmt::Display for Event {
             Self::Tick { step } => write!(formatter, "step {step}"),
             Self::Preparing(what) => what.fmt(formatter),
             Self::Measuring { done, total } => write!(formatter, "measured {done} of {total}"),
-            Self::Matching { stage, done, total } if *done > 0 => {
+            Self::Matching {
+                stage,
+                done,
+                total,
+                interval,
+            } => {
                 let percent = (100 * done).checked_div(*total).unwrap_or(100);
-                write!(formatter, "finding pairs: {stage}, {percent} %")
+                write!(formatter, "{}: {stage}", finding(*interval))?;
+                match done {
+                    0 => Ok(()),
+                    _ => write!(formatter, ", {percent} %"),
+                }
             }
             _ => formatter.write_str(&self.line(None).unwrap_or_default()),
         }
+    }
+}
+
+/// That pairs are being found, between which key frames of many.
+fn finding([k, intervals]: [usize; 2]) -> String {
+    match intervals {
+        0 | 1 => "finding pairs".to_owned(),
+        _ => format!("finding pairs, {} of {intervals}", k + 1),
     }
 }
 

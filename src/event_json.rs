@@ -44,9 +44,15 @@ pub(super) fn value(event: &Event) -> Value {
             };
             json!({"event": "preparing", "what": what})
         }
-        Event::Matching { stage, done, total } => {
-            json!({"event": "matching", "stage": stage.to_string(), "done": done, "total": total})
-        }
+        Event::Matching {
+            stage,
+            done,
+            total,
+            interval: [interval, intervals],
+        } => json!({
+            "event": "matching", "stage": stage.to_string(), "done": done, "total": total,
+            "interval": interval, "intervals": intervals,
+        }),
         Event::Matched {
             pairs,
             coverage,

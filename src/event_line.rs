@@ -8,7 +8,7 @@
 
 use std::time::Duration;
 
-use super::{Event, StepReport, TermReport, Trust};
+use super::{Event, MatchStage, StepReport, TermReport, Trust, finding};
 
 /// Terms that are named one by one; the others are summed.
 const NAMED_TERMS: usize = 3;
@@ -18,7 +18,15 @@ const NAMED_TERMS: usize = 3;
 /// `left` is how long the remaining steps may take.
 pub(super) fn line(event: &Event, left: Option<Duration>) -> Option<String> {
     Some(match event {
-        Event::Matching { stage, done: 0, .. } => format!("finding pairs: {stage}"),
+        // Of many only where one begins.
+        Event::Matching {
+            stage,
+            done: 0,
+            interval,
+            ..
+        } if interval[1] <= 1 || *stage == MatchStage::Surfaces => {
+            format!("{}: {stage}", finding(*interval))
+        }
         Event::Preparing(_)
         | Event::Tick { .. }
         | Event::Measuring { .. }

@@ -67,6 +67,7 @@ pub use session::describe::describe;
 pub use session::export::{Exported, export};
 pub use session::extract::{ExtractOptions, even_times};
 pub use session::folder::is_run;
+pub use session::grown::Appended;
 pub use session::pace::Ease;
 pub use session::report::current_report;
 pub use session::sampled_field::FieldGrid;

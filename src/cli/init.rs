@@ -29,7 +29,7 @@ pub(super) struct InitArgs {
     correspondences: String,
 
     /// Values of all other keys: instant, quick, default, quality or paper [default: default; instant for three shapes
-    /// and more, which networks do not take]
+    /// and more]
     #[arg(long)]
     preset: Option<String>,
 

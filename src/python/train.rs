@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use isomorph::morph::{MorphOptions, plan_morph};
-use isomorph::{Backend, Recipe, Session};
+use isomorph::{Appended, Backend, Recipe, Session};
 use pyo3::prelude::*;
 
 use crate::failure::raised;
@@ -84,19 +84,29 @@ pub(crate) fn train(
     trained(py, session, backend, on_event)
 }
 
-/// Goes on with a run.
+/// Goes on with a run, and with further shapes where there are some.
 #[pyfunction]
-#[pyo3(signature = (run, changes, backend, device, on_event))]
+#[pyo3(signature = (run, appended, changes, backend, device, on_event))]
 pub(crate) fn resume(
     py: Python<'_>,
     run: PathBuf,
+    appended: (Vec<PathBuf>, Option<Vec<f64>>, Option<String>),
     changes: Vec<String>,
     backend: &str,
     device: Option<String>,
     on_event: Option<Py<PyAny>>,
 ) -> PyResult<Run> {
     let backend = chosen(backend, device.as_deref())?;
-    let session = released(py, || Session::resume(&run, &changes, backend.clone()));
+    let (shapes, times, known) = appended;
+    let appended = Appended {
+        shapes,
+        times,
+        known,
+    };
+    let session = released(py, || match appended.shapes.is_empty() {
+        true => Session::resume(&run, &changes, backend.clone()),
+        false => Session::append(&run, &appended, &changes, backend.clone()),
+    });
     trained(py, session.map_err(raised)?, backend, on_event)
 }
 

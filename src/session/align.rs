@@ -12,7 +12,7 @@ use crate::geometry::linear::{difference, length, mean, scaled};
 use crate::geometry::similarity::{Similarity, angle_of};
 use crate::matching::{RigidMotion, rigid_motion};
 use crate::recipe::{self, Align, Recipe};
-use crate::shape::{Correspondences, Shape};
+use crate::shape::{Correspondences, Shape, columns};
 
 /// Sizes that differ by less than this factor may be one shape grown or shrunk: "auto" leaves them.
 const SIZES: f64 = 3.0;
@@ -114,7 +114,7 @@ fn places(
     let between = &recipe.data.between;
     let known = match &between[k] {
         recipe::Correspondences::File(path) => {
-            Correspondences::read_between(path, k, between.len() + 1, [source, target])?
+            Correspondences::read_between(path, k, columns(between, k), [source, target])?
         }
         recipe::Correspondences::SameVertices => Correspondences::same_vertices(source, target)?,
         recipe::Correspondences::Match | recipe::Correspondences::None => Correspondences::none(),

@@ -19,6 +19,7 @@ use std::path::{Component, Path, PathBuf};
 use isomorph_training::records::{RecordError, Records};
 use serde::{Deserialize, Serialize};
 
+use super::grown::Grown;
 use crate::atomic::flush_folder;
 use crate::recipe::{Recipe, RecipeError};
 use crate::shape::{Bounds, Coordinates, Normalisation, Placements};
@@ -55,6 +56,9 @@ pub(crate) struct State {
     pub placements: Placements,
     /// The bounds of both shapes, normalised.
     pub bounds: Bounds,
+    /// What it has from before key frames were appended, if some were.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub grown: Option<Grown>,
     /// The whole recipe, resolved, as TOML.
     pub recipe: String,
     /// Size and checksum of the other files, by name.
@@ -225,6 +229,14 @@ impl Checkpoint {
         };
         let files = self.state.files.iter().map(read);
         Ok(Records(files.collect::<Result<_, _>>()?))
+    }
+
+    /// What `state.json` says and cannot be.
+    pub(crate) fn damaged_state(&self, problem: String) -> CheckpointError {
+        CheckpointError::Damaged {
+            path: self.path.join(STATE),
+            problem,
+        }
     }
 
     /// A record of this checkpoint that is not what the method takes.

@@ -253,7 +253,7 @@ impl Bench<'_> {
         let run = self.folder(pair).join(compare::file_stem(&method.label));
         let stored = stored(&run, recipe);
         let shapes = prepare::read(recipe)?;
-        let prepared = prepare::prepare(recipe, &shapes, stored.as_ref(), on_event)?;
+        let prepared = prepare::prepare(recipe, &shapes, stored.as_ref(), None, on_event)?;
         let keyframes = &prepared.keyframes;
         let name = format!("method {}", method.label);
         learned::check(recipe, &keyframes.normalisation).map_err(|error| error.within(&name))?;

@@ -157,6 +157,12 @@ impl RunFolder {
         })
     }
 
+    /// The same where they may have been found before further key frames were appended to two.
+    pub(crate) fn found_pairs(&self, k: usize, intervals: usize) -> PathBuf {
+        let (own, of_two) = (self.pairs(k, intervals), self.pairs(k, 1));
+        if k == 0 && !own.exists() { of_two } else { own }
+    }
+
     /// The folder of checkpoints.
     pub(crate) fn checkpoints(&self) -> PathBuf {
         self.0.join("checkpoints")

@@ -15,6 +15,7 @@ use isomorph_training::records::BURN_VERSION;
 pub(crate) use self::error::LearnerError;
 use self::guided::{guided, unguided};
 use super::checkpoint::{self, Checkpoint, State};
+use super::grown::Grown;
 use super::{not_finite, self_test};
 use crate::event::{Event, StepReport, TermReport};
 use crate::memory;
@@ -44,7 +45,10 @@ pub(crate) struct Learner {
     trainer: Box<dyn Trainer>,
     backend: String,
     device: String,
+    /// Steps done. The trainer counts from the last time that key frames were appended.
     step: usize,
+    /// What is there from before key frames were appended.
+    grown: Option<Grown>,
     seconds: f64,
     /// What was decided other than the recipe says.
     notes: Vec<String>,
@@ -61,12 +65,13 @@ impl Learner {
         keyframes: &Keyframes,
         engine: &dyn Engine,
     ) -> Result<Self, LearnerError> {
-        Self::at(0, recipe, keyframes, engine)
+        Self::at(0, None, recipe, keyframes, engine)
     }
 
     /// A learner with the networks as they are made, for the steps from this one on.
     fn at(
         step: usize,
+        grown: Option<Grown>,
         recipe: Recipe,
         keyframes: &Keyframes,
         engine: &dyn Engine,
@@ -74,11 +79,13 @@ impl Learner {
         let mut data = keyframes.training_data();
         method::check(&recipe, &data).map_err(LearnerError::Missing)?;
         let mut notes = Vec::new();
-        // What the networks train by, where it is not what the recipe says.
+        // What is trained by, where it is not what the recipe says.
         let mut networks = recipe.clone();
+        let before = grown.map_or(0, |grown| grown.step);
+        networks.training.steps = recipe.training.steps.saturating_sub(before).max(1);
         let points = data.keys.iter().map(|key| key.points.len());
         let given = (points.collect(), data.pair_count());
-        let is_guided = method::is_guided(&recipe, step);
+        let is_guided = method::is_guided(&networks, step - before);
         let is_partial = !keyframes.keys.iter().all(encloses);
         if is_guided || method::has_end_fields(&recipe) && is_partial {
             match guide(&recipe, keyframes) {
@@ -96,7 +103,7 @@ impl Learner {
             data.between.clear();
         }
         let trainer: Box<dyn Trainer> = if is_solved {
-            let solved = Solved::new(&recipe, keyframes).map_err(LearnerError::Unsolved)?;
+            let solved = Solved::new(&networks, keyframes).map_err(LearnerError::Unsolved)?;
             Box::new(solved)
         } else {
             engine.method(&networks, &data.bounds)?
@@ -115,6 +122,7 @@ impl Learner {
             given,
             data,
             step,
+            grown,
             seconds: 0.0,
             recipe,
             notes,
@@ -133,9 +141,18 @@ impl Learner {
         checkpoint: &Checkpoint,
     ) -> Result<Self, LearnerError> {
         fits(checkpoint, &recipe, keyframes)?;
-        let mut learner = Self::at(checkpoint.state.step, recipe, keyframes, engine)?;
-        let restored = learner.trainer.restore(&checkpoint.records()?);
-        restored.map_err(|error| checkpoint.damaged(error))?;
+        let (grown, begins) = Grown::of(checkpoint, &recipe)?;
+        let mut learner = Self::at(checkpoint.state.step, grown, recipe, keyframes, engine)?;
+        let (trainer, records) = (&mut learner.trainer, checkpoint.records()?);
+        let taken = match grown {
+            Some(grown) if begins => trainer.grow(&records, grown.known),
+            Some(grown) => {
+                trainer.spare(grown.known);
+                trainer.restore(&records)
+            }
+            None => trainer.restore(&records),
+        };
+        taken.map_err(|error| checkpoint.damaged(error))?;
         learner.seconds = checkpoint.state.seconds;
         Ok(learner)
     }
@@ -143,6 +160,11 @@ impl Learner {
     /// What is trained, as it stands.
     pub(crate) fn trainer(&self) -> &dyn Trainer {
         &*self.trainer
+    }
+
+    /// The step that the trainer makes next, as it counts.
+    fn own_step(&self, step: usize) -> usize {
+        step - self.grown.map_or(0, |grown| grown.step)
     }
 
     /// Seconds of training so far, over all resumes.
@@ -185,7 +207,7 @@ impl Learner {
         let mut saved = self.step > 0;
         let mut phase = None;
         while self.step < steps {
-            let entered = self.trainer.phase(self.step);
+            let entered = self.trainer.phase(self.own_step(self.step));
             if phase != Some(entered) {
                 phase = Some(entered);
                 emit(Event::PhaseEntered {
@@ -233,7 +255,8 @@ impl Learner {
 
     /// One step of the optimisers; the unweighted terms with their weights if `read` asks for them.
     pub(crate) fn advance(&mut self, read: bool) -> Option<Vec<TermReport>> {
-        let report = self.trainer.advance(&self.data, self.step, read);
+        let own = self.own_step(self.step);
+        let report = self.trainer.advance(&self.data, own, read);
         self.step += 1;
         report
     }
@@ -261,7 +284,7 @@ impl Learner {
         emit: &mut dyn FnMut(Event) -> std::io::Result<()>,
     ) -> Result<(), LearnerError> {
         let wrong = terms.iter().find(|term| !term.raw.is_finite()).cloned();
-        let made = self.step - 1;
+        let made = self.own_step(self.step - 1);
         let rates = self.trainer.rates(made);
         let report = StepReport {
             step: self.step,
@@ -338,6 +361,7 @@ impl Learner {
             normalisation: self.coordinates.normalisation,
             placements: self.coordinates.placements.clone(),
             bounds: self.data.bounds,
+            grown: self.grown,
             recipe: self.recipe.to_toml(),
             files: Default::default(),
         }
@@ -366,11 +390,23 @@ pub(crate) fn fits(
     recipe: &Recipe,
     keyframes: &Keyframes,
 ) -> Result<(), LearnerError> {
-    if let Some((change, why)) = method::fixed_change(&checkpoint.recipe()?, recipe) {
+    let before = checkpoint.recipe()?;
+    let grows = recipe.data.continues(&before.data);
+    // What learns anew has another grid, other levels and other shapes.
+    let fixed = match grows && method::spline::is_solved(recipe) {
+        true => method::changed_method(&before, recipe),
+        false => method::fixed_change(&before, recipe),
+    };
+    if let Some((change, why)) = fixed {
         let path = checkpoint.path.clone();
         return Err(LearnerError::OtherNetworks { path, change, why });
     }
-    if checkpoint.state.coordinates() != keyframes.coordinates() {
+    let (own, stored) = (keyframes.coordinates(), checkpoint.state.coordinates());
+    let are_same = match grows {
+        true => own.begin_as(&stored, before.data.keyframes.len()),
+        false => own == stored,
+    };
+    if !are_same {
         return Err(LearnerError::OtherShapes(checkpoint.path.clone()));
     }
     Ok(())

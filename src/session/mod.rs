@@ -20,6 +20,7 @@
 //! | `memory_need.rs` | how much memory a run takes |
 //! | `learner.rs`, `learner/` | the loop that trains a method |
 //! | `not_finite.rs` | where a method in training has no number |
+//! | `grown.rs` | runs to which key frames were appended |
 //! | `learned.rs` | from a method or a checkpoint to surfaces and motion |
 //! | `folder.rs`, `lock.rs`, `checkpoint.rs` | the folder of a run, for one process, and whole checkpoints or none |
 //! | `self_test.rs` | a device held against a processor before it trains |
@@ -40,6 +41,7 @@ pub(crate) mod evaluate;
 pub(crate) mod export;
 pub(crate) mod extract;
 pub(crate) mod folder;
+pub(crate) mod grown;
 mod learned;
 pub(crate) mod learner;
 mod lock;

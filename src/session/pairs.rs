@@ -63,7 +63,14 @@ fn find_around(
     options: &MatchOptions,
     mut on_event: impl FnMut(&Event),
 ) -> Result<Matching> {
-    let mut report = |stage, done, total| on_event(&Event::Matching { stage, done, total });
+    let mut report = |stage, done, total| {
+        on_event(&Event::Matching {
+            stage,
+            done,
+            total,
+            interval: [0, 1],
+        });
+    };
     Ok(match_shapes(source, target, given, options, &mut report)?)
 }
 

@@ -14,7 +14,7 @@ use crate::recipe::{self, Recipe};
 use crate::session::folder::RunFolder;
 use crate::shape::{
     self, CleanOptions, Coordinates, CorrespondenceSource, Correspondences, DataOptions, Keyframes,
-    NormalSource, Placements,
+    NormalSource, Normalisation, Placements,
 };
 use crate::solved::sheet_thickness;
 
@@ -71,7 +71,7 @@ pub(super) fn shape_of(
 }
 
 /// Makes the shapes of a recipe ready. Pairs that are to be found are read from `stored` if that
-/// file exists.
+/// file exists. If `frame` is given, the first so many shapes decide the normalisation.
 ///
 /// # Errors
 /// What [`shape::prepare`] and [`match_shapes`] refuse.
@@ -79,6 +79,7 @@ pub(super) fn prepare(
     recipe: &Recipe,
     shapes: &[Shape],
     stored: Option<&RunFolder>,
+    frame: Option<usize>,
     emit: &mut dyn FnMut(&Event),
 ) -> Result<Prepared> {
     let Aligned {
@@ -97,15 +98,18 @@ pub(super) fn prepare(
             recipe::Correspondences::SameVertices => CorrespondenceSource::SameVertices,
             recipe::Correspondences::File(path) => CorrespondenceSource::File(path.clone()),
             recipe::Correspondences::Match => {
-                let stored = stored.map(|run| run.pairs(k, intervals));
-                let (known, matching) = matched(recipe, shapes, stored.as_deref(), emit)?;
+                let stored = stored.map(|run| run.found_pairs(k, intervals));
+                let interval = [k, intervals];
+                let (known, matching) = matched(recipe, shapes, interval, stored.as_deref(), emit)?;
                 found.extend(matching.map(|matching| (k, matching)));
                 CorrespondenceSource::Pairs(known)
             }
         });
     }
     emit(&Event::Preparing(Preparation::Points));
-    let options = options(recipe, between);
+    let first = frame.map(|count| &shapes[..count.min(shapes.len())]);
+    let first = first.map(|shapes| Normalisation::joint(&shapes.iter().collect::<Vec<_>>()));
+    let options = options(recipe, between, first.transpose()?);
     let mut keyframes = shape::prepare(shapes, &options)?;
     if !to_files.is_empty() {
         let centre = keyframes.normalisation.centre;
@@ -126,6 +130,7 @@ pub(super) fn prepare(
 fn matched(
     recipe: &Recipe,
     shapes: &[Shape],
+    interval: [usize; 2],
     stored: Option<&Path>,
     emit: &mut dyn FnMut(&Event),
 ) -> Result<(Correspondences, Option<Matching>)> {
@@ -144,7 +149,12 @@ fn matched(
         &Correspondences::none(),
         &options,
         &mut |stage, done, total| {
-            emit(&Event::Matching { stage, done, total });
+            emit(&Event::Matching {
+                stage,
+                done,
+                total,
+                interval,
+            });
         },
     )?;
     Ok((found.correspondences(), Some(found)))
@@ -158,7 +168,7 @@ fn matched(
 pub(super) fn points_only(recipe: &Recipe, coordinates: &Coordinates) -> Result<Keyframes> {
     let unknown = recipe.data.between.iter();
     let unknown = unknown.map(|_| CorrespondenceSource::None).collect();
-    let options = options(recipe, unknown);
+    let options = options(recipe, unknown, Some(coordinates.normalisation));
     let shapes = read(recipe)?.into_iter().zip(&options.times);
     let laid = shapes.map(|(shape, time)| match coordinates.at(*time).to_file {
         Some(to_file) => shape.laid_by(&to_file.inverse()),
@@ -170,7 +180,11 @@ pub(super) fn points_only(recipe: &Recipe, coordinates: &Coordinates) -> Result<
 }
 
 /// What a recipe says of its shapes.
-fn options(recipe: &Recipe, between: Vec<CorrespondenceSource>) -> DataOptions {
+fn options(
+    recipe: &Recipe,
+    between: Vec<CorrespondenceSource>,
+    normalisation: Option<Normalisation>,
+) -> DataOptions {
     let section = &recipe.data;
     DataOptions {
         times: section.unit_times(),
@@ -185,6 +199,7 @@ fn options(recipe: &Recipe, between: Vec<CorrespondenceSource>) -> DataOptions {
         },
         mirrored: section.mirrored,
         sheets: sheet_thickness(recipe),
+        normalisation,
         seed: recipe.training.seed,
     }
 }
@@ -196,7 +211,7 @@ impl Keyframes {
     /// # Errors
     /// A shape that cannot be read or sampled, pairs that cannot be read or found.
     pub fn of(recipe: &Recipe) -> Result<Self> {
-        let prepared = prepare(recipe, &read(recipe)?, None, &mut |_| {})?;
+        let prepared = prepare(recipe, &read(recipe)?, None, None, &mut |_| {})?;
         Ok(prepared.keyframes)
     }
 }

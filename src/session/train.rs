@@ -10,6 +10,7 @@ use isomorph_training::engine::{Engine, Trainer};
 use self::begun::Begun;
 use super::checkpoint::{Checkpoint, CheckpointError};
 use super::folder::RunFolder;
+use super::grown::{self, Appended};
 use super::learned;
 use super::learner::{LearnerError, Outcome};
 use super::log::RunLog;
@@ -23,6 +24,7 @@ use crate::backend::Backend;
 use crate::error::{Error, ErrorKind, Result};
 use crate::event::Event;
 use crate::formats::{Shape, SurfaceFormat};
+use crate::gltf::Precision;
 use crate::recipe::Recipe;
 use crate::session::extract::ExtractOptions;
 use crate::surface::frames::OutputFormat;
@@ -89,6 +91,20 @@ impl Default for Output {
     }
 }
 
+impl Output {
+    /// As it was written the last time: of `isomorph morph` animations.
+    fn of(run: &RunFolder) -> Self {
+        let is_there = |file: &str| run.meshes().join(file).is_file();
+        if !is_there("surface.glb") {
+            return Self::default();
+        }
+        Self {
+            format: OutputFormat::Animation(Precision::Full),
+            carry: is_there("carried.glb"),
+        }
+    }
+}
+
 /// Where training begins.
 enum Start {
     /// At its first step.
@@ -131,15 +147,51 @@ impl Session {
     ///
     /// # Errors
     /// A folder that is no run, a damaged checkpoint, a change that the checkpoint does not fit.
+    ///
+    /// Changes may append key frames to those of a run, as in `data.keys=[0, 10, 18]`; so may lines in its recipe.
     pub fn resume(folder: impl AsRef<Path>, changes: &[String], backend: Backend) -> Result<Self> {
-        let run = RunFolder::open(folder.as_ref())?;
+        Self::going_on(folder.as_ref(), None, changes, backend)
+    }
+
+    /// A run that goes on with further shapes after its last key frame. `changes` as of [`Self::resume`].
+    ///
+    /// What the run has learned is kept: its coordinates stay, networks go on from what they are, and splines are solved
+    /// for anew. The steps of the appended key frames come after those of the run, unless `changes` has
+    /// `training.steps`.
+    ///
+    /// # Errors
+    /// Those of [`Self::resume`], times that do not ascend, no shape.
+    pub fn append(
+        folder: impl AsRef<Path>,
+        appended: &Appended,
+        changes: &[String],
+        backend: Backend,
+    ) -> Result<Self> {
+        Self::going_on(folder.as_ref(), Some(appended), changes, backend)
+    }
+
+    fn going_on(
+        folder: &Path,
+        appended: Option<&Appended>,
+        changes: &[String],
+        backend: Backend,
+    ) -> Result<Self> {
+        let run = RunFolder::open(folder)?;
         let (mut recipe, notes) = run.stored_recipe()?;
+        if let Some(appended) = appended {
+            appended.to(&mut recipe)?;
+        }
         recipe.with_all(changes)?;
         let checkpoint = match Checkpoint::newest(&run.checkpoints()) {
             Ok(checkpoint) => Some(Box::new(checkpoint)),
             // Stopped before its first checkpoint: it starts again, with the same seed.
             Err(CheckpointError::None(_)) => None,
             Err(damaged) => return Err(damaged.into()),
+        };
+        let is_appended = appended.is_some();
+        let grows = match &checkpoint {
+            Some(checkpoint) => grown::begin(checkpoint, &mut recipe, is_appended, changes)?,
+            None => false,
         };
         Ok(Self {
             engine: backend.open()?,
@@ -148,11 +200,11 @@ impl Session {
             folder: run.path().to_path_buf(),
             start: Start::GoOn {
                 checkpoint,
-                rewrite: !changes.is_empty(),
+                rewrite: is_appended || !changes.is_empty() || grows,
                 notes,
             },
             stop: StopFlag::default(),
-            output: Output::default(),
+            output: Output::of(&run),
             memory_limit: None,
         })
     }

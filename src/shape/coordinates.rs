@@ -69,6 +69,21 @@ impl Placements {
         self.keys.is_empty()
     }
 
+    /// Whether the first `count` shapes lie as they do in `before`, where they are all: at times of another span.
+    pub(crate) fn begins_as(&self, before: &Self, count: usize, centre: [f64; 3]) -> bool {
+        let as_given = Placement {
+            time: 0.0,
+            scale: 1.0,
+            rotation: [1.0, 0.0, 0.0, 0.0],
+            place: centre,
+        };
+        let of = |all: &Self, k: usize| Placement {
+            time: 0.0,
+            ..all.keys.get(k).copied().unwrap_or(as_given)
+        };
+        (0..count).all(|k| of(self, k) == of(before, k))
+    }
+
     /// The way to the coordinates of the files at a time.
     fn at(&self, time: f64, centre: [f64; 3]) -> Option<Similarity> {
         let moments: Vec<f64> = self.keys.iter().map(|key| key.time).collect();
@@ -116,6 +131,13 @@ impl Coordinates {
             normalisation,
             placements: Placements::default(),
         }
+    }
+
+    /// Whether these are those of `before`, which are of the first `count` shapes.
+    pub(crate) fn begin_as(&self, before: &Self, count: usize) -> bool {
+        let centre = self.normalisation.centre;
+        self.normalisation == before.normalisation
+            && self.placements.begins_as(&before.placements, count, centre)
     }
 
     /// The way at a time, from 0 to 1.
@@ -348,6 +370,19 @@ mod tests {
         let goal = laid()[1].apply(vertex);
         let found = place.displaced(vertex, [start, start], &moved);
         assert!(off(found, goal) < 1e-6, "{found:?} {goal:?}");
+    }
+
+    #[test]
+    fn further_shapes_leave_the_first_ones_where_they_lie() {
+        let (two, three) = (coordinates(2), coordinates(3));
+        assert!(three.begin_as(&two, 2) && three.begin_as(&three, 3));
+        assert!(!three.begin_as(&two, 3), "the third lies elsewhere");
+        // None was laid before, and the first is not now.
+        let none = Coordinates::as_given(two.normalisation);
+        assert!(two.begin_as(&none, 1) && !two.begin_as(&none, 2));
+        let mut other = two.clone();
+        other.normalisation.scale = 3.0;
+        assert!(!three.begin_as(&other, 2));
     }
 
     #[test]

@@ -53,6 +53,8 @@ pub(crate) struct DataOptions {
     /// The thickness of open sheets, normalised, where shapes themselves are carried. None of it, or 0, where they are
     /// closed by a cushion.
     pub sheets: Option<f64>,
+    /// The way to normalised coordinates, where it is given.
+    pub normalisation: Option<Normalisation>,
     /// Names the samples that are drawn.
     pub seed: u64,
 }
@@ -146,6 +148,17 @@ impl Keyframes {
     }
 }
 
+/// How many key frames what is known from key frame `k` to the next is about, where it is a table with a column for each:
+/// those from the first on between which it is the same, so that others may be appended, else all.
+pub(crate) fn columns<T: PartialEq>(between: &[T], k: usize) -> usize {
+    let of_first = between.iter().take_while(|known| **known == between[0]);
+    match of_first.count() {
+        // Two key frames have pairs, and no table.
+        count if k < count && count > 1 => count + 1,
+        _ => between.len() + 1,
+    }
+}
+
 /// What is drawn at random; each has its own stream, so that no choice shifts another. The numbers are those
 /// of two shapes from the first release on: they stay, so that a seed keeps its samples.
 #[derive(Clone, Copy)]
@@ -208,7 +221,8 @@ pub(crate) fn prepare(shapes: &[Shape], options: &DataOptions) -> Result<Keyfram
         .map(|shape| shape.area())
         .collect::<Result<_, _>>()?;
     let all: Vec<&Shape> = shapes.iter().map(Cow::as_ref).collect();
-    let normalisation = Normalisation::of_areas(&all, &areas);
+    let normalisation = options.normalisation;
+    let normalisation = normalisation.unwrap_or_else(|| Normalisation::of_areas(&all, &areas));
     let mut between: Vec<Vec<PointPair>> = Vec::with_capacity(options.between.len());
     let mut confidence = Vec::with_capacity(options.between.len());
     let mut fit_mirrors = Vec::with_capacity(options.between.len());
@@ -371,7 +385,7 @@ fn correspondences(
     let available = match from {
         CorrespondenceSource::None => return Ok(PointPairs::default()),
         CorrespondenceSource::File(path) => {
-            Correspondences::read_between(path, k, options.times.len(), [source, target])?
+            Correspondences::read_between(path, k, columns(&options.between, k), [source, target])?
         }
         CorrespondenceSource::SameVertices => Correspondences::same_vertices(source, target)?,
         CorrespondenceSource::Pairs(known) => known.clone(),

@@ -231,6 +231,13 @@ impl Trainer for Solved {
         Ok(())
     }
 
+    /// Splines are solved for anew: that takes seconds, and the motion before is another one where it goes on.
+    fn grow(&mut self, _: &Records, _: usize) -> Result<(), RecordError> {
+        Ok(())
+    }
+
+    fn spare(&mut self, _: usize) {}
+
     /// It has no networks; [`arrays`] gives its splines and shapes.
     fn weights(&self) -> Option<NetworkWeights> {
         None

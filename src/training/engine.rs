@@ -109,6 +109,15 @@ pub trait Trainer {
     /// [`RecordError`] if one is missing or is not of this method.
     fn restore(&mut self, records: &Records) -> Result<(), RecordError>;
 
+    /// Takes what a run through the first `known` key frames has learned, and goes on with further ones.
+    ///
+    /// # Errors
+    /// As of [`Self::restore`].
+    fn grow(&mut self, records: &Records, known: usize) -> Result<(), RecordError>;
+
+    /// Learns little of the first `known` key frames: see [`Method::spare`].
+    fn spare(&mut self, known: usize);
+
     /// What the networks have learned, as plain arrays; `None` if the method has none that others can use.
     fn weights(&self) -> Option<Weights>;
 
@@ -312,6 +321,14 @@ impl<B: TrainBackend> Trainer for InTraining<B> {
 
     fn restore(&mut self, records: &Records) -> Result<(), RecordError> {
         self.method.restore(records)
+    }
+
+    fn grow(&mut self, records: &Records, known: usize) -> Result<(), RecordError> {
+        self.method.grow(records, known)
+    }
+
+    fn spare(&mut self, known: usize) {
+        self.method.spare(known);
     }
 
     fn weights(&self) -> Option<Weights> {

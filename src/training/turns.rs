@@ -12,6 +12,19 @@ pub(crate) fn turn(seed: u64, step: usize, count: usize) -> usize {
     order[place]
 }
 
+/// The same where the intervals between the first `known` key frames are learned already: every other step is made in one
+/// of the others.
+pub(crate) fn turn_among(seed: u64, step: usize, count: usize, known: usize) -> usize {
+    let learned = known.saturating_sub(1);
+    if learned == 0 || learned >= count {
+        return turn(seed, step, count);
+    }
+    match step % 2 {
+        0 => learned + turn(seed, step / 2, count - learned),
+        _ => turn(seed, step / 2, learned),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -28,5 +41,21 @@ mod tests {
         }
         assert!((1..4).any(|k| round(k) != round(0)));
         assert_eq!(round(2), round(2));
+    }
+
+    #[test]
+    fn every_other_step_is_of_intervals_that_are_not_learned() {
+        let turns: Vec<usize> = (0..12).map(|step| turn_among(3, step, 8, 7)).collect();
+        let of = |parity: usize| {
+            let mut all: Vec<usize> = turns.iter().copied().skip(parity).step_by(2).collect();
+            all.sort_unstable();
+            all
+        };
+        assert_eq!(of(0), [6, 6, 6, 7, 7, 7]);
+        assert_eq!(of(1), [0, 1, 2, 3, 4, 5]);
+        for known in [0, 9] {
+            let all = (0..16).map(|step| turn_among(3, step, 8, known));
+            assert!(all.eq((0..16).map(|step| turn(3, step, 8))));
+        }
     }
 }

@@ -5,6 +5,7 @@
 #![allow(clippy::panic_in_result_fn, reason = "tests fail by panics")]
 
 mod aligned;
+mod appended;
 mod backends;
 mod bad_comparisons;
 mod bad_methods;

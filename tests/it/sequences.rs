@@ -9,7 +9,7 @@ use crate::support::sequence::Sequence;
 use crate::support::workplace::{Workplace, names, turn};
 
 /// Small surfaces and a solver with few samples.
-const SMALL: [&str; 8] = [
+pub(crate) const SMALL: [&str; 8] = [
     "--set",
     "result.resolution=32",
     "--set",
@@ -21,7 +21,7 @@ const SMALL: [&str; 8] = [
 ];
 
 /// A sphere that falls faster and faster, at these times; `scan-TIME.ply`.
-fn falling(times: &[u32]) -> Workplace {
+pub(crate) fn falling(times: &[u32]) -> Workplace {
     let place = Workplace::new();
     for time in times {
         let way = 0.05 * f64::from(time * time);
@@ -31,7 +31,7 @@ fn falling(times: &[u32]) -> Workplace {
     place
 }
 
-fn mean_z(mesh: &Mesh) -> f64 {
+pub(crate) fn mean_z(mesh: &Mesh) -> f64 {
     mesh.vertices.iter().map(|x| x[2]).sum::<f64>() / mesh.vertices.len() as f64
 }
 

@@ -113,6 +113,46 @@ impl<B: ModelBackend> SequenceVelocity<B> {
     }
 }
 
+impl<B: ModelBackend> SequenceVelocity<B> {
+    /// This velocity through further key frames: up to the last of its own nothing changes, and beyond them `V` comes to
+    /// rest. `times` are those of all key frames; the first ones are this velocity's own, in any unit and from any
+    /// beginning.
+    ///
+    /// # Panics
+    /// If there are fewer times than this velocity has.
+    #[must_use]
+    pub fn through(&self, times: &[f64]) -> Self {
+        let last = self.times.len() - 2;
+        let further = times.len() - self.times.len();
+        let [before, after] = [&self.times[..], times].map(|times| quadratics(times, last));
+        // Another mean interval is another unit. The last function bends as far as it did between these two.
+        let (unit, bend) = (before[0][0] / after[0][0], before[2][2] / after[2][2]);
+        let mut net = self.net.clone();
+        let output = net.mlp.output();
+        let of = |param: &Param<Tensor<B, 2>>| {
+            let all = param.val();
+            let [rows, columns] = all.dims();
+            let own = all.clone() * unit;
+            let [second, third] = [columns - 6, columns - 3];
+            let part = |of: &Tensor<B, 2>, from: usize| of.clone().slice([0..rows, from..from + 3]);
+            let bent = (part(&all, third) - part(&all, second)) * bend;
+            let kept = own.clone().slice([0..rows, 0..third]);
+            let rest = Tensor::zeros([rows, 3 * further], &all.device());
+            let all = Tensor::cat(vec![kept, part(&own, second) + bent, rest], 1);
+            Param::initialized(param.id, all)
+        };
+        let output = Dense {
+            weight: of(&output.weight),
+            bias: of(&output.bias),
+        };
+        net.mlp.put_output(output);
+        Self {
+            net,
+            times: times.to_vec(),
+        }
+    }
+}
+
 impl<B: ModelBackend> IntervalVelocity<B> {
     /// The functions of time that act, as `a + b t + c t^2` with `t` from 0 to 1: those of the outputs of this interval's
     /// number and of the two after it.
@@ -269,6 +309,24 @@ mod tests {
             assert_close(before.0, after.0, 1e-4, "V");
             assert_close(before.1, after.1, 1e-3, "its rate");
         }
+    }
+
+    #[test]
+    fn through_further_key_frames_it_is_the_same_up_to_its_last_one() {
+        let times = [0.0, 0.2, 0.5, 1.0];
+        let net = net::<Plain>(&times, 0, 0);
+        // In another unit, from another beginning.
+        let grown = net.through(&[10.0, 12.0, 15.0, 20.0, 21.0, 29.0]);
+        for s in 0..3 {
+            for t in [0.0, 0.3, 1.0] {
+                let [own, other] = [&net, &grown].map(|net| host(jet(&net.interval(s), t).value));
+                assert!(own.iter().any(|v| v.abs() > 0.02), "{own:?}");
+                assert_close(other, own, 1e-5, &format!("{s} {t}"));
+            }
+        }
+        let rests = host(jet(&grown.interval(4), 1.0).value);
+        assert_close(rests, vec![0.0; 9], 1e-12, "at the end");
+        assert_eq!(grown.times().len(), 6);
     }
 
     #[test]

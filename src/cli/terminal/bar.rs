@@ -12,7 +12,7 @@ use std::time::Instant;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use isomorph::Event;
-use isomorph::event::{MatchStage, duration};
+use isomorph::event::duration;
 
 use super::pace::Pace;
 use super::told;
@@ -84,7 +84,7 @@ impl<S: Screen> Bar<S> {
                 self.begin(*steps, *first_step);
             }
             Event::PhaseEntered { phase, .. } => self.phase = phase.to_string(),
-            Event::Matching { stage, done, total } => self.find(*stage, *done, *total),
+            Event::Matching { done, total, .. } => self.find(event, *done, *total),
             Event::Extracting { frames } => self.begin(*frames, 0),
             Event::Extracted { .. } => self.extracted(),
             _ => {}
@@ -140,13 +140,13 @@ impl<S: Screen> Bar<S> {
     }
 
     /// Pairs that are found: a bar for each stage, which ends with it.
-    fn find(&mut self, stage: MatchStage, done: usize, total: usize) {
+    fn find(&mut self, event: &Event, done: usize, total: usize) {
         if done == 0 || self.bar.is_none() {
             self.begin(total, done);
         }
         let Some(bar) = &self.bar else { return };
         bar.set_position(done as u64);
-        bar.set_message(format!("finding pairs: {stage}"));
+        bar.set_message(event.to_string());
         if done >= total {
             self.clear();
         }

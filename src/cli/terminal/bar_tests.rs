@@ -2,7 +2,7 @@
 
 use super::*;
 use indicatif::TermLike;
-use isomorph::event::{Phase, StepReport, TermReport};
+use isomorph::event::{MatchStage, Phase, StepReport, TermReport};
 use std::io;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -178,16 +178,25 @@ fn lines_are_printed_above_the_bar_and_the_end_clears_it() {
 fn each_stage_of_matching_has_a_line_and_a_bar_of_its_own() {
     let now = Instant::now();
     let (screen, mut bar) = screen_and_bar(now);
-    let matching = |stage, done, total| Event::Matching { stage, done, total };
+    let matching = |stage, done, total| Event::Matching {
+        stage,
+        done,
+        total,
+        interval: [2, 13],
+    };
     bar.show(&matching(MatchStage::Surfaces, 0, 1), now);
-    assert!(screen.drawn().contains("finding pairs: surfaces\n"));
+    assert!(
+        screen
+            .drawn()
+            .contains("finding pairs, 3 of 13: surfaces\n")
+    );
     bar.show(&matching(MatchStage::Surfaces, 1, 1), now);
     assert!(bar.bar.is_none(), "the stage is done");
     bar.show(&matching(MatchStage::Registration, 0, 80), now);
     bar.show(&matching(MatchStage::Registration, 60, 80), now);
     let drawn = screen.drawn();
     assert!(
-        drawn.contains("60/80 [============>   ] finding pairs: registration"),
+        drawn.contains("60/80 [============>   ] finding pairs, 3 of 13: registration"),
         "{drawn}"
     );
     bar.show(&matching(MatchStage::Registration, 80, 80), now);

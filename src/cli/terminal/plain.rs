@@ -131,6 +131,7 @@ mod tests {
             stage,
             done,
             total: 4,
+            interval: [0, 1],
         };
         let text = written(&[
             (0.0, matching(MatchStage::Surfaces, 0)),
@@ -145,6 +146,24 @@ mod tests {
             text,
             format!("finding pairs: surfaces\n{registration}\n{registration}, 50 %\n")
         );
+    }
+
+    #[test]
+    fn of_pairs_between_many_key_frames_one_line_is_written_for_each_two() {
+        let matching = |k, stage| Event::Matching {
+            stage,
+            done: 0,
+            total: 4,
+            interval: [k, 3],
+        };
+        let text = written(&[
+            (0.0, matching(0, MatchStage::Surfaces)),
+            (0.1, matching(0, MatchStage::Registration)),
+            (0.2, matching(0, MatchStage::Pairs)),
+            (0.3, matching(1, MatchStage::Surfaces)),
+        ]);
+        let lines = "finding pairs, 1 of 3: surfaces\nfinding pairs, 2 of 3: surfaces\n";
+        assert_eq!(text, lines);
     }
 
     #[test]

@@ -6,7 +6,7 @@ import os
 import warnings
 from hashlib import sha256
 from pathlib import Path
-from typing import Any, Callable, Mapping, Sequence
+from typing import Any, Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -131,6 +131,9 @@ def train(
 def resume(
     run: str | os.PathLike[str],
     *,
+    append: Iterable[str | os.PathLike[str]] = (),
+    times: Sequence[float] | None = None,
+    pairs: str | os.PathLike[str] | None = None,
     settings: Mapping[str, Any] | None = None,
     backend: str = "flex",
     device: str | None = None,
@@ -141,6 +144,10 @@ def resume(
 
     Args:
         run: the folder of the run, or a run.
+        append: files of further shapes, which the motion goes on to after the run's last one. What is there is kept.
+        times: their times, in the run's own unit; without them each is as far from the one before as the run's last two.
+        pairs: pairs of points from the shape before each of them to it, "same-vertices", "match", "none" or a file;
+            without it as between the run's last two.
         settings: keys that change, such as `{"training.steps": 2000}`; see `morph`.
         backend: see `morph`.
         device: see `morph`.
@@ -155,7 +162,9 @@ def resume(
         isomorph.TrainingError: a key that a trained network cannot change; work that failed.
         KeyboardInterrupt: on Ctrl-C; a checkpoint is left.
     """
-    given = (os.fspath(run), changes(settings), backend, device)
+    known = None if pairs is None else os.fspath(pairs)
+    appended = ([os.fspath(shape) for shape in append], None if times is None else list(times), known)
+    given = (os.fspath(run), appended, changes(settings), backend, device)
     return work(lambda heard: _native.resume(*given, heard), [], on_event, progress)
 
 

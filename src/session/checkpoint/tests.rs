@@ -17,6 +17,7 @@ fn state(step: usize) -> State {
         },
         placements: Placements::default(),
         bounds: Bounds::of(&[[0.0; 3]]),
+        grown: None,
         recipe: String::new(),
         files: BTreeMap::default(),
     }

@@ -7,6 +7,7 @@ use crate::event::Event;
 use crate::session::against_input::End;
 use crate::session::checkpoint::{self, Checkpoint};
 use crate::session::folder::RunFolder;
+use crate::session::grown::Grown;
 use crate::session::learned::{self, Frame};
 use crate::session::learner::{self, Learner};
 use crate::session::lock::RunLock;
@@ -83,7 +84,7 @@ impl Session {
 
     /// A run before its first step: everything is checked before its folder is made.
     pub(super) fn begin(&self, replace: bool, on_event: &mut dyn FnMut(&Event)) -> Result<Begun> {
-        let prepared = prepare::prepare(&self.recipe, &self.shapes, None, on_event)?;
+        let prepared = prepare::prepare(&self.recipe, &self.shapes, None, None, on_event)?;
         learned::check(&self.recipe, &prepared.keyframes.normalisation)?;
         let learner = Learner::new(self.recipe.clone(), &prepared.keyframes, &*self.engine)?;
         let (run, lock) = RunFolder::create(&self.folder, &self.recipe.to_toml(), replace)?;
@@ -110,7 +111,12 @@ impl Session {
         };
         let run = RunFolder::open(&self.folder)?;
         let lock = run.lock()?;
-        let prepared = prepare::prepare(&self.recipe, &self.shapes, Some(&run), on_event)?;
+        let grown = match checkpoint {
+            Some(checkpoint) => Grown::of(checkpoint, &self.recipe)?.0,
+            None => None,
+        };
+        let frame = grown.map(|grown| grown.frame);
+        let prepared = prepare::prepare(&self.recipe, &self.shapes, Some(&run), frame, on_event)?;
         let keyframes = &prepared.keyframes;
         let changes = match checkpoint {
             Some(checkpoint) => {

@@ -62,6 +62,7 @@ fn tetrahedra() -> Files {
         normals: NormalSource::Auto,
         mirrored: false,
         sheets: None,
+        normalisation: None,
         seed: 9,
     };
     let (source, target) = (folder.path().join("a.obj"), folder.path().join("b.obj"));
@@ -338,4 +339,17 @@ fn three_key_frames_have_pairs_between_each_two_and_samples_of_their_own() {
         "one shape, drawn anew"
     );
     assert_eq!(three.training_data().keys.len(), 3);
+}
+
+#[test]
+fn a_table_is_about_the_key_frames_from_the_first_on_that_share_it() {
+    let of = |between: &str| -> Vec<usize> {
+        let between: Vec<char> = between.chars().collect();
+        (0..between.len()).map(|k| columns(&between, k)).collect()
+    };
+    assert_eq!(of("aaa"), [4, 4, 4]);
+    assert_eq!(of("aab"), [3, 3, 4]);
+    // One file of pairs, and others.
+    assert_eq!(of("abb"), [4, 4, 4]);
+    assert_eq!(of("a"), [2]);
 }

@@ -18,6 +18,7 @@ fn options(pairs: CorrespondenceSource, points: usize, sheets: Option<f64>) -> D
         normals: NormalSource::Auto,
         mirrored: false,
         sheets,
+        normalisation: None,
         seed: 0,
     }
 }

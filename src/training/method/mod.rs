@@ -187,6 +187,18 @@ pub trait Method<B: TrainBackend>: Sync {
     /// [`RecordError`] if a record is missing or of another kind.
     fn restore(&mut self, records: &Records) -> Result<(), RecordError>;
 
+    /// Takes the networks of a run through the first `known` key frames, which are learned already. A method whose
+    /// networks are others there learns all anew.
+    ///
+    /// # Errors
+    /// [`RecordError`] if a record is missing or of another kind.
+    fn grow(&mut self, _: &Records, _known: usize) -> Result<(), RecordError> {
+        Ok(())
+    }
+
+    /// Learns little of the first `known` key frames, which were learned before the others were there.
+    fn spare(&mut self, _known: usize) {}
+
     /// What the networks have learned, as plain arrays; of the methods that isomorph is compared with nothing.
     fn weights(&self) -> Option<Weights> {
         None
@@ -239,15 +251,24 @@ pub fn check(recipe: &Recipe, data: &TrainingData) -> Result<(), String> {
     Ok(())
 }
 
+/// The change of a run's method, which no run takes, and why.
+pub fn changed_method(before: &Recipe, after: &Recipe) -> Option<(Change, &'static str)> {
+    let mut changes = before.changes(after).into_iter();
+    let change = changes
+        .find(|change| change.key.starts_with("method.") || change.key == "velocity.kind")?;
+    Some((change, "a run keeps its method"))
+}
+
 /// The first change that a run cannot take once it has begun, and why: another method, another network, or
 /// a key that the method fixes.
 pub fn fixed_change(before: &Recipe, after: &Recipe) -> Option<(Change, &'static str)> {
+    if let Some(change) = changed_method(before, after) {
+        return Some(change);
+    }
     let fixed = spec_of(before).fixed;
     before.changes(after).into_iter().find_map(|change| {
         let section = change.key.split('.').next().unwrap_or_default();
         let why = match section {
-            "method" => "a run keeps its method",
-            _ if change.key == "velocity.kind" => "a run keeps its method",
             "implicit" | "velocity" => "a trained network cannot change its shape",
             _ => fixed.iter().find(|(key, _)| *key == change.key)?.1,
         };
@@ -340,25 +361,27 @@ impl<B: TrainBackend, M: AutodiffModule<B>> Trainee<B, M> {
 
     /// Adds the records of network and optimiser.
     pub(crate) fn record(&self, records: &mut Records) -> io::Result<()> {
-        self.record_net(records)?;
+        records.push::<B>(self.file(), self.net.clone().into_record())?;
         self.optimiser.record(&self.name, records)
-    }
-
-    fn record_net(&self, records: &mut Records) -> io::Result<()> {
-        records.push::<B>(self.file(), self.net.clone().into_record())
     }
 
     /// Takes both from records.
     pub(crate) fn restore(&mut self, records: &Records) -> Result<(), RecordError> {
+        let net = self.loaded(self.net.clone(), records)?;
+        self.optimiser
+            .restore(&self.name, &self.file(), records, &self.device)?;
+        self.net = net;
+        Ok(())
+    }
+
+    /// A network with the weights of the record of this name, which has that form.
+    fn loaded(&self, form: M, records: &Records) -> Result<M, RecordError> {
         let file = self.file();
         let mut own = Records::default();
-        self.record_net(&mut own)
+        own.push::<B>(file.clone(), form.clone().into_record())
             .map_err(|error| RecordError::new(&file, error.to_string()))?;
         let net = records.get::<B, M::Record>(&file, &own, &self.device)?;
-        self.optimiser
-            .restore(&self.name, &file, records, &self.device)?;
-        self.net = self.net.clone().load_record(net);
-        Ok(())
+        Ok(form.load_record(net))
     }
 
     fn file(&self) -> String {

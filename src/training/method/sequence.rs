@@ -7,10 +7,13 @@
 //!
 //! Terms are as those of splines through many key frames: matching and on-surface are means of each interval, and the
 //! regularisers are integrals over time, whose unit is the mean interval ([`scaled`]).
+//!
+//! Where key frames are appended to a run, its end fields stay as they are, and `V` goes on from what it was. Half of the
+//! steps are then made between the new key frames.
 
 use std::io;
 
-use burn::module::Module;
+use burn::module::{AutodiffModule, Module};
 use burn::tensor::Tensor;
 use isomorph_model::flow::end_fields::{EndFields, end_field};
 use isomorph_model::{
@@ -28,8 +31,12 @@ use crate::samples::{self, Drawn};
 use crate::schedule::Schedule;
 use crate::settings::Settings;
 use crate::tensors::rows;
-use crate::turns::turn;
+use crate::turns::turn_among;
 use crate::weights::{IntervalWeights, Weights};
+
+/// The learning rates of `V` where key frames are appended, over those of its first steps: at the first rates the motion
+/// between the key frames before is lost and has to be found again.
+const GROWN_RATE: f64 = 0.3;
 
 /// The end fields, the velocity field and how they are trained.
 pub(super) struct EndsThroughKeys<B: TrainBackend> {
@@ -45,6 +52,8 @@ pub(super) struct EndsThroughKeys<B: TrainBackend> {
     /// One for each key frame.
     ends: Vec<Trainee<B, ImplicitNet<B>>>,
     velocity: Trainee<B, SequenceVelocity<B>>,
+    /// Of the first so many key frames all is learned: those before they were more.
+    known: usize,
 }
 
 /// The weights of an interval of length `h`, where the mean of all is 1, for a velocity per length of the interval:
@@ -93,6 +102,7 @@ impl<B: TrainBackend> EndsThroughKeys<B> {
             times,
             ends,
             settings,
+            known: 0,
         }
     }
 
@@ -107,7 +117,8 @@ impl<B: TrainBackend> EndsThroughKeys<B> {
 
     /// The interval of a step.
     fn interval(&self, step: usize) -> usize {
-        turn(self.settings.training.seed, step, self.times.len() - 1)
+        let intervals = self.times.len() - 1;
+        turn_among(self.settings.training.seed, step, intervals, self.known)
     }
 }
 
@@ -117,7 +128,11 @@ impl<B: TrainBackend> Method<B> for EndsThroughKeys<B> {
     }
 
     fn rates(&self, step: usize) -> Rates {
-        flow::rates(&self.settings, &self.schedule, step)
+        let rates = flow::rates(&self.settings, &self.schedule, step);
+        Rates {
+            velocity: rates.velocity * if self.known > 0 { GROWN_RATE } else { 1.0 },
+            ..rates
+        }
     }
 
     fn parts(&self) -> usize {
@@ -151,7 +166,11 @@ impl<B: TrainBackend> Method<B> for EndsThroughKeys<B> {
         let clip = self.settings.training.clip;
         let (s, phase, rates) = (self.interval(step), self.phase(step), self.rates(step));
         for end in 0..2 {
-            self.ends[s + end].advance(slopes.take(end), rates.implicit, clip);
+            let slopes = slopes.take(end);
+            // A shape that is learned does not depend on those that come after it.
+            if s + end >= self.known {
+                self.ends[s + end].advance(slopes, rates.implicit, clip);
+            }
         }
         if phase != Phase::ImplicitOnly {
             self.velocity.advance(slopes.take(2), rates.velocity, clip);
@@ -177,6 +196,32 @@ impl<B: TrainBackend> Method<B> for EndsThroughKeys<B> {
             end.restore(records)?;
         }
         self.velocity.restore(records)
+    }
+
+    fn grow(&mut self, records: &Records, known: usize) -> Result<(), RecordError> {
+        // The V of two shapes depends on time in another way.
+        if known <= 2 {
+            return Ok(());
+        }
+        for end in &mut self.ends[..known] {
+            end.restore(records)?;
+        }
+        let config = SequenceVelocityConfig {
+            velocity: self.settings.velocity,
+            times: self.times[..known].to_vec(),
+        };
+        let form = config.init(self.settings.training.seed, &self.device);
+        let before = self.velocity.loaded(form, records)?;
+        let grown = SequenceVelocity::<B>::from_inner(before.valid().through(&self.times));
+        // As a record: what is put in directly would not be trained.
+        let form = self.velocity.net.clone();
+        self.velocity.net = form.load_record(grown.into_record());
+        self.spare(known);
+        Ok(())
+    }
+
+    fn spare(&mut self, known: usize) {
+        self.known = if known > 2 { known } else { 0 };
     }
 
     fn weights(&self) -> Option<Weights> {

@@ -10,8 +10,8 @@ use crate::recipe::rule::Rule;
 use crate::recipe::schema::section;
 use crate::recipe::{Motion, Recipe, VelocityKind};
 
-/// The most steps: Gauss-Newton has converged long before.
-pub(crate) const MOST_STEPS: usize = 200;
+/// The most steps: Gauss-Newton has converged long before. Each time that key frames are appended, its steps are added.
+pub(crate) const MOST_STEPS: usize = 500;
 
 /// Splines.
 pub(super) static SPLINE: MethodSpec = MethodSpec {

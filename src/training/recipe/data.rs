@@ -86,6 +86,14 @@ impl DataRecipe {
         self.keyframes.len() == 2 && self.keyframes.iter().all(|key| key.frame.is_none())
     }
 
+    /// Whether these are the key frames of `before` and further ones after them.
+    pub fn continues(&self, before: &DataRecipe) -> bool {
+        let (keys, known) = (before.keyframes.len(), before.between.len());
+        self.keyframes.len() > keys
+            && self.keyframes[..keys] == before.keyframes[..]
+            && self.between[..known] == before.between[..]
+    }
+
     /// Whether `source` and `target` say all of the key frames.
     fn is_short(&self) -> bool {
         self.is_pair() && self.keyframes[0].time == 0.0 && self.keyframes[1].time == 1.0

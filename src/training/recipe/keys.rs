@@ -232,8 +232,8 @@ section! {
     /// The steps of training, and the samples of each.
     training: TrainingRecipe {
         /// Training steps. More give finer details; time grows in proportion. The paper uses 10000. A
-        /// spline takes at most 200.
-        steps: usize = 18 | 550 | 1_000 | 10_000 | 10_000, Rule::whole(1, MANY);
+        /// spline takes at most 500.
+        steps: usize = 18 | 550 | 1_000 | 3_000 | 10_000, Rule::whole(1, MANY);
         /// Sample points in each step. The paper uses 4000.
         batch: usize = 2_200 | 2_200 | 4_000 | 4_000 | 4_000, Rule::whole(64, 1_000_000);
         /// Correspondences in each step, or all if fewer are known. The paper leaves it open.
@@ -241,7 +241,7 @@ section! {
         /// What moves the weights. "muon": Muon moves the matrices between hidden layers, Adam all
         /// other weights. "adam": Adam moves all weights. A run keeps its optimiser. The paper does not
         /// name one.
-        optimiser: Optimiser = "adam" | "muon" | "muon" | "adam" | "adam", Rule::word(Optimiser::WORDS);
+        optimiser: Optimiser = "adam" | "muon" | "muon" | "muon" | "adam", Rule::word(Optimiser::WORDS);
         /// Learning rate of f. Sine networks take 3e-4 to 5e-4, softplus networks 1e-3 to 2e-3. The
         /// paper uses 0.005.
         learning_rate: f64 = 5e-4 | 5e-4 | 5e-4 | 3e-4 | 5e-3, Rule::above_zero(1.0);
@@ -264,7 +264,7 @@ section! {
         /// Until then V learns the field of splines that the preset "instant" finds, instead of the terms
         /// of the motion, and the end fields train beside it. Fewer steps are needed then. Where no splines are
         /// found, V learns from its own terms throughout. Not in the paper.
-        guided_until: f64 = 0 | 1 | 0.6 | 0 | 0,
+        guided_until: f64 = 0 | 1 | 0.6 | 0.6 | 0,
             Rule::number(0.0, 1.0).unit("share of the steps").zero("starts without splines");
         /// End of the warm-up. Until then the weight of on-surface is 0 and matching-warm-up
         /// replaces matching. In "network" only V trains until then; in "flow" the end fields train

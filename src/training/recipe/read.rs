@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use super::data::{DataRecipe, KEYFRAME};
+use super::data::{DataRecipe, KEYFRAME, KeyframeRecipe};
 use super::entry::{Entries, Entry, Place, keyframe_id};
 use super::error::RecipeError;
 use super::fallback::Fallback;
@@ -133,6 +133,49 @@ impl Recipe {
         Ok(())
     }
 
+    /// Appends key frames, each a shape with its time in the recipe's unit, their paths made absolute. `known`, in the
+    /// words of `data.correspondences`, is what is known of the points from the key frame before each of them to it;
+    /// without it, what is known between the last two. Keys that had the preset's value have that of so many key frames.
+    ///
+    /// # Errors
+    /// If times do not ascend, the key frames are frames of a sequence, the method takes two, or `known` is neither word
+    /// nor path; the recipe is then as it was.
+    pub fn append<P: AsRef<Path>>(
+        &mut self,
+        shapes: &[(P, f64)],
+        known: Option<&str>,
+    ) -> Result<(), RecipeError> {
+        let count = self.data.keyframes.len();
+        let mut longer = self.clone();
+        let data = &mut longer.data;
+        let known = match known {
+            Some(text) => source::pairs_of(text)?,
+            None => data.between[count - 2].clone(),
+        };
+        for (path, time) in shapes {
+            if data.keyframes.iter().any(|key| key.frame.is_some()) {
+                return Err(RecipeError::KeyFrames {
+                    at: format!("{}: {}", Place::Held, path.as_ref().display()),
+                    problem: "the key frames before it are frames of a sequence; append to data.keys, as in --set \
+                              \"data.keys=[0, 10, 20]\""
+                        .to_owned(),
+                });
+            }
+            data.keyframes.push(KeyframeRecipe {
+                file: path.as_ref().to_owned(),
+                frame: None,
+                time: *time,
+            });
+            data.between.push(known.clone());
+        }
+        let mut entries = longer.held_above(count);
+        source::make_paths_absolute(&mut entries, Path::new(""))?;
+        let longer = resolve(entries, Path::new("recipe"), None)?;
+        longer.trainable(|| "the recipe".to_owned())?;
+        *self = longer;
+        Ok(())
+    }
+
     /// Whether its method can be trained on so many key frames; `at`: where they are named.
     fn trainable(&self, at: impl FnOnce() -> String) -> Result<(), RecipeError> {
         let keys = self.data.keyframes.len();
@@ -154,8 +197,13 @@ impl Recipe {
     /// Everything that the recipe says. What has the preset's value is the preset's, so that another preset
     /// brings its own.
     fn held(&self) -> Entries {
+        self.held_above(self.data.keyframes.len())
+    }
+
+    /// The same, where the preset's values are those of so many key frames.
+    fn held_above(&self, key_frames: usize) -> Entries {
         let held = |key, value| Entry::new(key, value, Place::Held);
-        let fallback = Fallback::new(self.preset, spec_of(self), self.data.keyframes.len());
+        let fallback = Fallback::new(self.preset, spec_of(self), key_frames);
         let own =
             |(key, value): &(&'static Key, Value)| fallback.value(key).as_ref() != Some(value);
         let values = self.acting().into_iter().filter(own);

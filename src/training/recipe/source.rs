@@ -13,6 +13,8 @@ use super::error::RecipeError;
 use super::keys::PRESET;
 use super::rule::{Kind, Value};
 use super::schema::{Key, Section};
+use super::setting::Setting;
+use super::words::Correspondences;
 use super::{catalogue, old, unknown};
 
 /// Text of a recipe and its name in messages.
@@ -194,6 +196,20 @@ pub(super) fn read_override(given: &str, entries: &mut Entries) -> Result<(), Re
     };
     entries.insert(key.id(), entry);
     Ok(())
+}
+
+/// What is known of corresponding points, from its word or the path of its file.
+///
+/// # Errors
+/// If it is neither.
+pub(super) fn pairs_of(text: &str) -> Result<Correspondences, RecipeError> {
+    let key = &KEYFRAME[2];
+    let admitted = key.rule.admit(&DeValue::String(text.into()));
+    let value = admitted.map_err(|allowed| RecipeError::Refused {
+        at: Place::Held.about(&key.id(), &shortened(text)),
+        allowed,
+    })?;
+    Ok(Correspondences::from_value(value).expect("it has passed its rule"))
 }
 
 /// Makes the paths that a recipe gives absolute; until then they are relative to `folder`.

@@ -269,3 +269,63 @@ fn what_is_known_throughout_can_be_changed_for_all_key_frames() {
     );
     assert_eq!(read(&recipe.to_toml()).expect("its own print"), recipe);
 }
+
+#[test]
+fn shapes_that_are_appended_come_last_and_bring_the_values_of_many() {
+    let mut recipe = parsed(SHAPES, &["preset=instant", "loss.matching=150"]).expect("a recipe");
+    let two = recipe.clone();
+    recipe
+        .append(&[("/c.ply", 2.0), ("/d.ply", 5.0)], Some("match"))
+        .expect("two more");
+    let of = |key: &KeyframeRecipe| (key.file.display().to_string(), key.time);
+    let told: Vec<_> = recipe.data.keyframes.iter().map(of).collect();
+    let wanted = [
+        ("/s.ply", 0.0),
+        ("/t.ply", 1.0),
+        ("/c.ply", 2.0),
+        ("/d.ply", 5.0),
+    ];
+    assert_eq!(told, wanted.map(|(file, time)| (file.to_owned(), time)));
+    let known = [
+        Correspondences::None,
+        Correspondences::Match,
+        Correspondences::Match,
+    ];
+    assert_eq!(recipe.data.between, known);
+    // Those of the preset change, and the user's own stays.
+    assert_eq!((two.training.steps, recipe.training.steps), (18, 10));
+    assert_eq!(recipe.loss.matching, 150.0);
+    assert_eq!(read(&recipe.to_toml()).expect("its own print"), recipe);
+    // They go on after those before; not the other way round, nor with others.
+    assert!(recipe.data.continues(&two.data));
+    assert!(!two.data.continues(&recipe.data) && !two.data.continues(&two.data));
+    let mut other = two.clone();
+    other.data.keyframes[1].time = 0.5;
+    assert!(!recipe.data.continues(&other.data));
+    // Without a word it is as it was between the last two.
+    recipe.append(&[("/e.ply", 6.0)], None).expect("one more");
+    assert_eq!(recipe.data.between[3], Correspondences::Match);
+}
+
+#[test]
+fn what_cannot_be_appended_leaves_the_recipe_as_it_was() {
+    let recipe = parsed(SHAPES, &["preset=instant"]).expect("a recipe");
+    let refused = |recipe: &Recipe, time: f64, known: Option<&str>| {
+        let mut longer = recipe.clone();
+        let refused = longer
+            .append(&[("/c.ply", time)], known)
+            .expect_err("refused");
+        assert_eq!(longer, *recipe);
+        refused.to_string()
+    };
+    assert!(refused(&recipe, 1.0, None).contains("its time 1 is not after 1"));
+    let found = refused(&recipe, 2.0, Some("mtach"));
+    assert!(
+        found.contains("mtach") && found.contains("\"match\""),
+        "{found}"
+    );
+    let frames = read(SEQUENCE).expect("frames of a sequence");
+    assert!(refused(&frames, 20.0, None).contains("append to data.keys"));
+    let paper = parsed(SHAPES, &["preset=paper"]).expect("a recipe");
+    assert!(refused(&paper, 2.0, None).contains("takes two key frames"));
+}

@@ -103,7 +103,7 @@ fn it_says_what_the_other_presets_have() {
     );
     let text = text.expect("Unicode paths");
     let steps =
-        "\n#training.steps = 550  # instant: 18, default: 1000, quality: 10000, paper: 10000\n";
+        "\n#training.steps = 550  # instant: 18, default: 1000, quality: 3000, paper: 10000\n";
     assert!(text.contains(steps), "{text}");
     assert!(text.contains("\ndata.source = \"a b.ply\"\n"), "{text}");
     // Without a folder or an extension it would be a misspelt word.

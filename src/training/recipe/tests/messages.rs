@@ -196,7 +196,7 @@ fn steps_of_training_are_refused_where_a_solver_takes_them() {
     let (kind, steps) = ("velocity.kind=spline", "training.steps=201");
     let text = refused(&[kind]);
     assert!(
-        text.contains("training.steps = 1000") && text.contains("at most 200"),
+        text.contains("training.steps = 1000") && text.contains("at most 500"),
         "{text}"
     );
     assert!(refused(&[kind, steps]).contains("preset = \"instant\""));
