@@ -146,8 +146,8 @@ def resume(
         run: the folder of the run, or a run.
         append: files of further shapes, which the motion goes on to after the run's last one. What is there is kept.
         times: their times, in the run's own unit; without them each is as far from the one before as the run's last two.
-        pairs: pairs of points from the shape before each of them to it, "same-vertices", "match", "none" or a file;
-            without it as between the run's last two.
+        pairs: what is known of their points: "same-vertices", "match", "none" or a file; without it as between the run's
+            last two.
         settings: keys that change, such as `{"training.steps": 2000}`; see `morph`.
         backend: see `morph`.
         device: see `morph`.
