@@ -9,7 +9,7 @@ use super::checkpoint::{Checkpoint, CheckpointError};
 use crate::error::{Error, Result};
 use crate::recipe::Recipe;
 
-/// Shares of a step of training: one for new key frames, one for those before.
+/// Of so many steps one is made between new key frames.
 const TURNS: usize = 2;
 
 /// What a run has from before key frames were appended to it.
@@ -127,17 +127,25 @@ const KEYS: &str = "data.keys";
 /// that were made to it say otherwise; whether its key frames go on.
 ///
 /// # Errors
-/// As of [`Grown::of`].
+/// As of [`Grown::of`], and networks that have not learned the key frames before.
 pub(super) fn begin(
     checkpoint: &Checkpoint,
     recipe: &mut Recipe,
     is_appended: bool,
     changes: &[String],
-) -> std::result::Result<bool, CheckpointError> {
+) -> Result<bool> {
     let (Some(grown), true) = Grown::of(checkpoint, recipe)? else {
         return Ok(false);
     };
     let before = checkpoint.recipe()?;
+    let (step, steps) = (checkpoint.state.step, before.training.steps);
+    if step < steps && grown.known > 2 && !is_solved(recipe) {
+        return Err(Error::usage(format!(
+            "{}: step {step} of {steps}: the shapes before are not learned yet; resume the run to its end before others \
+             are appended",
+            checkpoint.path.display()
+        )));
+    }
     let changes_a = |what: &str| changes.iter().any(|change| change.trim().starts_with(what));
     // Other steps than the checkpoint's are those of an earlier try, or of a recipe that was edited.
     let is_first = is_appended || changes_a(KEYS);

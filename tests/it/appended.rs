@@ -98,6 +98,14 @@ fn a_run_that_was_killed_while_it_grew_ends_in_the_same_state() {
         place.isomorph(&train).succeeded();
         let run = place.run("run");
         let first = run.step();
+        // Networks that are not done keep nothing that is worth keeping.
+        if preset == "quick" {
+            let half = place.run("half");
+            run.cut_at(100, &half);
+            let append = ["resume", "half", "--append", "scan-3.ply"];
+            let ended = place.isomorph(&append);
+            ended.refused(2, &["step-000100: step 100 of 240", "to its end before"]);
+        }
         // Twice 240 steps over two intervals would be 240: fewer will do.
         let fewer = ["--set", "training.steps=270"];
         let fewer = if more.is_empty() { &[][..] } else { &fewer };

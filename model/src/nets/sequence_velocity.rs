@@ -111,9 +111,7 @@ impl<B: ModelBackend> SequenceVelocity<B> {
             functions: quadratics(&self.times, s),
         }
     }
-}
 
-impl<B: ModelBackend> SequenceVelocity<B> {
     /// This velocity through further key frames: up to the last of its own nothing changes, and beyond them `V` comes to
     /// rest. `times` are those of all key frames; the first ones are this velocity's own, in any unit and from any
     /// beginning.
