@@ -193,12 +193,12 @@ fn steps_of_training_are_refused_where_a_solver_takes_them() {
         let error = parsed(SHAPES, overrides).expect_err("refused");
         error.to_string()
     };
-    let (kind, steps) = ("velocity.kind=spline", "training.steps=201");
+    let (kind, steps) = ("velocity.kind=spline", "training.steps=501");
     let text = refused(&[kind]);
     assert!(
         text.contains("training.steps = 1000") && text.contains("at most 500"),
         "{text}"
     );
     assert!(refused(&[kind, steps]).contains("preset = \"instant\""));
-    assert!(parsed(SHAPES, &[kind, "training.steps=200"]).is_ok());
+    assert!(parsed(SHAPES, &[kind, "training.steps=500"]).is_ok());
 }
