@@ -4,8 +4,9 @@ use std::fmt::Write;
 use std::path::Path;
 
 use isomorph_training::method::spec_of;
+use isomorph_training::method::spline::{self, is_solved};
 
-use super::checkpoint::{self, Checkpoint};
+use super::checkpoint::{self, Checkpoint, State};
 use super::folder::RunFolder;
 use crate::error::{Error, Result};
 use crate::formats::{self, Sequence, Shape};
@@ -121,7 +122,46 @@ fn run_info(path: &Path) -> Result<String> {
     writeln!(text, "preset       {}", recipe.preset)?;
     writeln!(text, "source       {}", recipe.data.source().display())?;
     writeln!(text, "target       {}", recipe.data.target().display())?;
-    if !spec.is_baseline {
+    key_frames(&mut text, state, &recipe)?;
+    fields(&mut text, &recipe)?;
+    let (centre, scale) = (state.normalisation.centre, state.normalisation.scale);
+    writeln!(text, "normalised   (x - {centre:?}) * {scale}")?;
+    if !state.placements.is_empty() {
+        writeln!(
+            text,
+            "aligned      data.align = \"{}\": x lies in the first file; results lie where the files do",
+            recipe.data.align
+        )?;
+    }
+    Ok(text)
+}
+
+/// How many key frames there are, where there are more than two, and which were appended.
+fn key_frames(text: &mut String, state: &State, recipe: &Recipe) -> std::fmt::Result {
+    let times: Vec<f64> = recipe.data.keyframes.iter().map(|key| key.time).collect();
+    if let [first, .., last] = times[..]
+        && times.len() > 2
+    {
+        let count = times.len();
+        writeln!(text, "key frames   {count}, at {first} to {last}")?;
+        if let Some(grown) = state.grown {
+            let (appended, step) = (count - grown.known.min(count), grown.step);
+            writeln!(text, "appended     {appended} of them after step {step}")?;
+        }
+    }
+    Ok(())
+}
+
+/// What `f` and `V` are.
+fn fields(text: &mut String, recipe: &Recipe) -> std::fmt::Result {
+    if is_solved(recipe) {
+        let spacing = spline::keys(recipe).spacing;
+        writeln!(text, "f            the shapes themselves")?;
+        writeln!(
+            text,
+            "V            splines, in cells of {spacing}, normalised"
+        )?;
+    } else if !spec_of(recipe).is_baseline {
         let (f, v) = (&recipe.implicit, &recipe.velocity);
         writeln!(
             text,
@@ -134,14 +174,5 @@ fn run_info(path: &Path) -> Result<String> {
             v.depth, v.width, v.activation
         )?;
     }
-    let (centre, scale) = (state.normalisation.centre, state.normalisation.scale);
-    writeln!(text, "normalised   (x - {centre:?}) * {scale}")?;
-    if !state.placements.is_empty() {
-        writeln!(
-            text,
-            "aligned      data.align = \"{}\": x lies in the first file; results lie where the files do",
-            recipe.data.align
-        )?;
-    }
-    Ok(text)
+    Ok(())
 }

@@ -77,6 +77,15 @@ fn splines_go_on_to_a_shape_that_is_appended() {
         .succeeded();
     let last = state(&run, 38);
     assert_eq!(last["normalisation"], before["normalisation"]);
+    let info = place.isomorph(&["info", "run"]).succeeded().stdout;
+    let lines = [
+        "key frames   4, at 0 to 3\n",
+        "appended     1 of them after step 28\n",
+        "V            splines, in cells of 0.15, normalised\n",
+    ];
+    for line in lines {
+        assert!(info.contains(line), "{line}: {info}");
+    }
     let found = carried_to(&place, "run", "2.5");
     assert!((found + 0.3125).abs() < 0.01, "{found}");
     // What finished is finished.
