@@ -101,8 +101,12 @@ impl Session {
         }
         let (stored, _) = RunFolder::open(folder)?.stored_recipe()?;
         if let Some(change) = stored.changes(&recipe).first() {
+            let cure = match recipe.data.continues(&stored.data) {
+                true => "append its further key frames with isomorph resume RUN --append FILE",
+                false => "delete it, or choose another folder",
+            };
             return Err(Error::usage(format!(
-                "{}: is a run of another recipe ({change}); delete it, or choose another folder",
+                "{}: is a run of another recipe ({change}); {cure}",
                 folder.display()
             )));
         }

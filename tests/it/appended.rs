@@ -63,6 +63,11 @@ fn splines_go_on_to_a_shape_that_is_appended() {
     for said in said {
         assert!(ended.stderr.contains(said), "{said}: {}", ended.stderr);
     }
+    // A recipe with more key frames is no reason to train anew.
+    place.write("recipe.toml", recipe("instant", &[0, 1, 2, 3]));
+    let again = ["train", "recipe.toml", "--run", "run", "--resume-if-exists"];
+    let ended = place.isomorph(&[&again[..], &SMALL].concat());
+    ended.refused(2, &["another recipe", "resume RUN --append FILE"]);
     // Lengths and places are as they were.
     let after = state(&run, 28);
     assert_eq!(after["normalisation"], before["normalisation"]);
