@@ -90,14 +90,9 @@ def main(words: list[str]) -> int:
     try:
         figures.check()
         command = shlex.join(["scripts/keys.py", *words])
-        if options.networks:
-            content = with_networks(compact.read(folder / compact.NAME), options, command)
-            compact.write(folder / compact.NAME, content)
-        elif options.many:
-            content = with_many(compact.read(folder / compact.NAME), options, command)
-            compact.write(folder / compact.NAME, content)
-        elif options.grown:
-            content = with_grown(compact.read(folder / compact.NAME), options, command)
+        parts = {"networks": with_networks, "many": with_many, "grown": with_grown}
+        if chosen := [renew for part, renew in parts.items() if getattr(options, part)]:
+            content = chosen[0](compact.read(folder / compact.NAME), options, command)
             compact.write(folder / compact.NAME, content)
         elif not options.table:
             content = measured(options, command)

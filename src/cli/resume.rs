@@ -50,17 +50,13 @@ pub(super) struct ResumeArgs {
 }
 
 pub(super) fn run(args: ResumeArgs) -> Result {
-    let (backend, changes) = (args.place.backend()?, &args.set.overrides);
-    let session = if args.append.is_empty() {
-        Session::resume(&args.run, changes, backend)?
-    } else {
-        let appended = Appended {
-            shapes: args.append,
-            times: args.times,
-            known: args.pairs,
-        };
-        Session::append(&args.run, &appended, changes, backend)?
+    let appended = Appended {
+        shapes: args.append,
+        times: args.times,
+        known: args.pairs,
     };
+    let (backend, changes) = (args.place.backend()?, &args.set.overrides);
+    let session = Session::append(&args.run, &appended, changes, backend)?;
     let session = session.stopped_by(stop_on_interrupt());
     let mut session = args.memory.limited(session);
     let mut terminal = args.progress.terminal(&args.run);

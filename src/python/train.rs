@@ -103,9 +103,8 @@ pub(crate) fn resume(
         times,
         known,
     };
-    let session = released(py, || match appended.shapes.is_empty() {
-        true => Session::resume(&run, &changes, backend.clone()),
-        false => Session::append(&run, &appended, &changes, backend.clone()),
+    let session = released(py, || {
+        Session::append(&run, &appended, &changes, backend.clone())
     });
     trained(py, session.map_err(raised)?, backend, on_event)
 }

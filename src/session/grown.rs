@@ -25,14 +25,14 @@ pub(crate) struct Grown {
 
 impl Grown {
     /// Of a run with this recipe that goes on from a checkpoint; `None` if all of its key frames were there from the
-    /// start. The second is whether the checkpoint is of fewer key frames.
+    /// start. It is the checkpoint's own unless that is of fewer key frames.
     ///
     /// # Errors
     /// If the checkpoint's recipe does not parse, or what it says of itself cannot be.
     pub(crate) fn of(
         checkpoint: &Checkpoint,
         recipe: &Recipe,
-    ) -> std::result::Result<(Option<Self>, bool), CheckpointError> {
+    ) -> std::result::Result<Option<Self>, CheckpointError> {
         let before = checkpoint.recipe()?;
         let found = checkpoint.state.grown;
         let (known, all) = (before.data.keyframes.len(), recipe.data.keyframes.len());
@@ -47,14 +47,13 @@ impl Grown {
             return Err(checkpoint.damaged_state(problem));
         }
         if all == known || !recipe.data.continues(&before.data) {
-            return Ok((found, false));
+            return Ok(found);
         }
-        let new = Self {
+        Ok(Some(Self {
             frame: found.map_or(known, |grown| grown.frame),
             known,
             step: checkpoint.state.step,
-        };
-        Ok((Some(new), true))
+        }))
     }
 
     /// The last step of a run that goes on from here with the appended key frames of `after`.
@@ -134,7 +133,8 @@ pub(super) fn begin(
     is_appended: bool,
     changes: &[String],
 ) -> Result<bool> {
-    let (Some(grown), true) = Grown::of(checkpoint, recipe)? else {
+    let last = checkpoint.state.grown;
+    let Some(grown) = Grown::of(checkpoint, recipe)?.filter(|grown| Some(*grown) != last) else {
         return Ok(false);
     };
     let before = checkpoint.recipe()?;
@@ -151,7 +151,7 @@ pub(super) fn begin(
     let is_first = is_appended || changes_a(KEYS);
     let is_same = recipe.training.steps == before.training.steps;
     if !changes_a(STEPS) && (is_first || is_same) {
-        recipe.training.steps = grown.last_step(&before, checkpoint.state.grown, recipe);
+        recipe.training.steps = grown.last_step(&before, last, recipe);
     }
     Ok(true)
 }

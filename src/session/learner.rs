@@ -1,6 +1,7 @@
 //! The loop that trains a method, from the first step or from a checkpoint, on whichever backend.
 
 mod error;
+mod fits;
 mod guided;
 
 use std::path::Path;
@@ -13,6 +14,7 @@ use isomorph_training::method;
 use isomorph_training::records::BURN_VERSION;
 
 pub(crate) use self::error::LearnerError;
+use self::fits::fits;
 use self::guided::{guided, unguided};
 use super::checkpoint::{self, Checkpoint, State};
 use super::grown::Grown;
@@ -141,11 +143,11 @@ impl Learner {
         checkpoint: &Checkpoint,
     ) -> Result<Self, LearnerError> {
         fits(checkpoint, &recipe, keyframes)?;
-        let (grown, begins) = Grown::of(checkpoint, &recipe)?;
+        let grown = Grown::of(checkpoint, &recipe)?;
         let mut learner = Self::at(checkpoint.state.step, grown, recipe, keyframes, engine)?;
         let (trainer, records) = (&mut learner.trainer, checkpoint.records()?);
         let taken = match grown {
-            Some(grown) if begins => trainer.grow(&records, grown.known),
+            Some(new) if grown != checkpoint.state.grown => trainer.grow(&records, new.known),
             Some(grown) => {
                 trainer.spare(grown.known);
                 trainer.restore(&records)
@@ -378,38 +380,6 @@ impl Learner {
             correspondences: self.given.1,
         }
     }
-}
-
-/// Whether training can go on from a checkpoint with this recipe and these shapes.
-///
-/// # Errors
-/// [`LearnerError::OtherNetworks`], [`LearnerError::OtherShapes`], and [`LearnerError::Checkpoint`] if the
-/// checkpoint's recipe no longer parses.
-pub(crate) fn fits(
-    checkpoint: &Checkpoint,
-    recipe: &Recipe,
-    keyframes: &Keyframes,
-) -> Result<(), LearnerError> {
-    let before = checkpoint.recipe()?;
-    let grows = recipe.data.continues(&before.data);
-    // What learns anew has another grid, other levels and other shapes.
-    let fixed = match grows && method::spline::is_solved(recipe) {
-        true => method::changed_method(&before, recipe),
-        false => method::fixed_change(&before, recipe),
-    };
-    if let Some((change, why)) = fixed {
-        let path = checkpoint.path.clone();
-        return Err(LearnerError::OtherNetworks { path, change, why });
-    }
-    let (own, stored) = (keyframes.coordinates(), checkpoint.state.coordinates());
-    let are_same = match grows {
-        true => own.begin_as(&stored, before.data.keyframes.len()),
-        false => own == stored,
-    };
-    if !are_same {
-        return Err(LearnerError::OtherShapes(checkpoint.path.clone()));
-    }
-    Ok(())
 }
 
 #[cfg(test)]

@@ -49,9 +49,11 @@ pub fn find_from(
 pub fn known_pairs(path: &Path, shapes: &[impl Borrow<Shape>]) -> Result<usize> {
     let between = shapes.windows(2).enumerate().map(|(k, two)| {
         let two = [two[0].borrow(), two[1].borrow()];
-        Ok(Correspondences::read_between(path, k, shapes.len(), two)?
-            .pairs
-            .len())
+        Ok(
+            Correspondences::read_between(path, k, [shapes.len(); 2], two)?
+                .pairs
+                .len(),
+        )
     });
     between.sum()
 }

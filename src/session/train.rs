@@ -27,6 +27,7 @@ use crate::formats::{Shape, SurfaceFormat};
 use crate::gltf::Precision;
 use crate::recipe::Recipe;
 use crate::session::extract::ExtractOptions;
+use crate::surface::animations_in;
 use crate::surface::frames::OutputFormat;
 
 /// A run that is about to be trained: a recipe, its shapes, a folder and a backend.
@@ -94,13 +95,12 @@ impl Default for Output {
 impl Output {
     /// As it was written the last time: of `isomorph morph` animations.
     fn of(run: &RunFolder) -> Self {
-        let is_there = |file: &str| run.meshes().join(file).is_file();
-        if !is_there("surface.glb") {
-            return Self::default();
-        }
-        Self {
-            format: OutputFormat::Animation(Precision::Full),
-            carry: is_there("carried.glb"),
+        match animations_in(&run.meshes()) {
+            [false, _] => Self::default(),
+            [true, carry] => Self {
+                format: OutputFormat::Animation(Precision::Full),
+                carry,
+            },
         }
     }
 }
@@ -145,42 +145,32 @@ impl Session {
     /// A run that goes on from its newest checkpoint, on any backend. `changes` are keys of its recipe with
     /// new values, as in `training.steps=2000`; those of its networks cannot change.
     ///
+    /// Changes may append key frames to those of a run, as in `data.keys=[0, 10, 18]`; so may lines in its recipe.
+    ///
     /// # Errors
     /// A folder that is no run, a damaged checkpoint, a change that the checkpoint does not fit.
-    ///
-    /// Changes may append key frames to those of a run, as in `data.keys=[0, 10, 18]`; so may lines in its recipe.
     pub fn resume(folder: impl AsRef<Path>, changes: &[String], backend: Backend) -> Result<Self> {
-        Self::going_on(folder.as_ref(), None, changes, backend)
+        Self::append(folder, &Appended::default(), changes, backend)
     }
 
-    /// A run that goes on with further shapes after its last key frame. `changes` as of [`Self::resume`].
+    /// A run that goes on with further shapes after its last key frame, where there are some. `changes` as of
+    /// [`Self::resume`].
     ///
     /// What the run has learned is kept: its coordinates stay, networks go on from what they are, and splines are solved
     /// for anew. The steps of the appended key frames come after those of the run, unless `changes` has
     /// `training.steps`.
     ///
     /// # Errors
-    /// Those of [`Self::resume`], times that do not ascend, no shape.
+    /// Those of [`Self::resume`], times that do not ascend, another number of times than shapes.
     pub fn append(
         folder: impl AsRef<Path>,
         appended: &Appended,
         changes: &[String],
         backend: Backend,
     ) -> Result<Self> {
-        Self::going_on(folder.as_ref(), Some(appended), changes, backend)
-    }
-
-    fn going_on(
-        folder: &Path,
-        appended: Option<&Appended>,
-        changes: &[String],
-        backend: Backend,
-    ) -> Result<Self> {
-        let run = RunFolder::open(folder)?;
+        let run = RunFolder::open(folder.as_ref())?;
         let (mut recipe, notes) = run.stored_recipe()?;
-        if let Some(appended) = appended {
-            appended.to(&mut recipe)?;
-        }
+        appended.to(&mut recipe)?;
         recipe.with_all(changes)?;
         let checkpoint = match Checkpoint::newest(&run.checkpoints()) {
             Ok(checkpoint) => Some(Box::new(checkpoint)),
@@ -188,7 +178,7 @@ impl Session {
             Err(CheckpointError::None(_)) => None,
             Err(damaged) => return Err(damaged.into()),
         };
-        let is_appended = appended.is_some();
+        let is_appended = !appended.shapes.is_empty();
         let grows = match &checkpoint {
             Some(checkpoint) => grown::begin(checkpoint, &mut recipe, is_appended, changes)?,
             None => false,

@@ -148,14 +148,16 @@ impl Keyframes {
     }
 }
 
-/// How many key frames what is known from key frame `k` to the next is about, where it is a table with a column for each:
-/// those from the first on between which it is the same, so that others may be appended, else all.
-pub(crate) fn columns<T: PartialEq>(between: &[T], k: usize) -> usize {
+/// How many key frames there are, and how many a table is about that was there before others were appended: those from
+/// the first on between which what is known is the same as from key frame `k` to the next. All, if these are not among
+/// them.
+pub(crate) fn columns<T: PartialEq>(between: &[T], k: usize) -> [usize; 2] {
+    let all = between.len() + 1;
     let of_first = between.iter().take_while(|known| **known == between[0]);
     match of_first.count() {
         // Two key frames have pairs, and no table.
-        count if k < count && count > 1 => count + 1,
-        _ => between.len() + 1,
+        count if k < count && count > 1 => [all, count + 1],
+        _ => [all; 2],
     }
 }
 

@@ -43,8 +43,8 @@ struct Row {
 enum Layout {
     /// Those of two shapes.
     Pairs,
-    /// One for each of so many key frames, of which `k` and the next count.
-    Tracks { k: usize, key_frames: usize },
+    /// One for each of so many key frames, either number, of which `k` and the next count.
+    Tracks { k: usize, key_frames: [usize; 2] },
 }
 
 /// What a file holds.
@@ -72,14 +72,15 @@ impl Correspondences {
     }
 
     /// Reads what a file of many key frames has of key frame `k` and the next, which are the shapes. A file without a
-    /// column for each key frame is one of pairs, the same between any two.
+    /// column for each key frame is one of pairs, the same between any two. It may be about all key frames, or about the
+    /// first ones alone: `key_frames` are both numbers.
     ///
     /// # Errors
     /// Those of [`Self::read`].
     pub(crate) fn read_between(
         path: &Path,
         k: usize,
-        key_frames: usize,
+        key_frames: [usize; 2],
         shapes: [&Shape; 2],
     ) -> Result<Self, ShapeError> {
         Self::read_as(path, Layout::Tracks { k, key_frames }, shapes)

@@ -13,6 +13,11 @@ pub(super) const SURFACE: &str = "surface.glb";
 /// The file of the source that moves.
 pub(super) const CARRIED: &str = "carried.glb";
 
+/// Whether a folder has the file of the surfaces, and that of the source.
+pub(crate) fn animations_in(folder: &Path) -> [bool; 2] {
+    [SURFACE, CARRIED].map(|file| folder.join(file).is_file())
+}
+
 /// Writes the surfaces, in the order of their times.
 ///
 /// # Errors

@@ -22,4 +22,5 @@ mod layers;
 pub(crate) mod learned;
 pub(crate) mod trust;
 
+pub(crate) use animation::animations_in;
 pub(crate) use error::FramesError;

@@ -72,6 +72,22 @@ pub struct IntervalVelocity<B: Backend> {
     functions: [[f64; 3]; ACTING],
 }
 
+/// The network with what `of` makes of weights and biases of its output layer, one column for each output.
+fn with_output<B: ModelBackend>(
+    net: &VelocityNet<B>,
+    of: impl Fn(Tensor<B, 2>) -> Tensor<B, 2>,
+) -> VelocityNet<B> {
+    let mut net = net.clone();
+    let output = net.mlp.output();
+    let made = |param: &Param<Tensor<B, 2>>| Param::initialized(param.id, of(param.val()));
+    let output = Dense {
+        weight: made(&output.weight),
+        bias: made(&output.bias),
+    };
+    net.mlp.put_output(output);
+    net
+}
+
 impl<B: ModelBackend> SequenceVelocity<B> {
     /// The times of the key frames.
     pub fn times(&self) -> &[f64] {
@@ -93,21 +109,12 @@ impl<B: ModelBackend> SequenceVelocity<B> {
     /// # Panics
     /// If there is no such interval.
     pub fn interval(&self, s: usize) -> IntervalVelocity<B> {
-        let mut net = self.net.clone();
-        let output = net.mlp.output();
         let columns = 3 * s..3 * (s + ACTING);
-        let of = |param: &Param<Tensor<B, 2>>| {
-            let all = param.val();
-            let rows = all.dims()[0];
-            Param::initialized(param.id, all.slice([0..rows, columns.clone()]))
-        };
-        let output = Dense {
-            weight: of(&output.weight),
-            bias: of(&output.bias),
-        };
-        net.mlp.put_output(output);
         IntervalVelocity {
-            net,
+            net: with_output(&self.net, |all| {
+                let rows = all.dims()[0];
+                all.slice([0..rows, columns.clone()])
+            }),
             functions: quadratics(&self.times, s),
         }
     }
@@ -125,10 +132,7 @@ impl<B: ModelBackend> SequenceVelocity<B> {
         let [before, after] = [&self.times[..], times].map(|times| quadratics(times, last));
         // Another mean interval is another unit. The last function bends as far as it did between these two.
         let (unit, bend) = (before[0][0] / after[0][0], before[2][2] / after[2][2]);
-        let mut net = self.net.clone();
-        let output = net.mlp.output();
-        let of = |param: &Param<Tensor<B, 2>>| {
-            let all = param.val();
+        let net = with_output(&self.net, |all| {
             let [rows, columns] = all.dims();
             let own = all.clone() * unit;
             let [second, third] = [columns - 6, columns - 3];
@@ -136,14 +140,8 @@ impl<B: ModelBackend> SequenceVelocity<B> {
             let bent = (part(&all, third) - part(&all, second)) * bend;
             let kept = own.clone().slice([0..rows, 0..third]);
             let rest = Tensor::zeros([rows, 3 * further], &all.device());
-            let all = Tensor::cat(vec![kept, part(&own, second) + bent, rest], 1);
-            Param::initialized(param.id, all)
-        };
-        let output = Dense {
-            weight: of(&output.weight),
-            bias: of(&output.bias),
-        };
-        net.mlp.put_output(output);
+            Tensor::cat(vec![kept, part(&own, second) + bent, rest], 1)
+        });
         Self {
             net,
             times: times.to_vec(),
@@ -235,20 +233,11 @@ mod tests {
 
     /// The network whose last layer is what it is at a time, or the rate of that.
     fn frozen(velocity: &IntervalVelocity<Plain>, weights: [f64; ACTING]) -> VelocityNet<Plain> {
-        let mut net = velocity.net.clone();
-        let output = net.mlp.output();
-        let summed = |param: &Param<Tensor<Plain, 2>>| {
-            let all = param.val();
+        with_output(&velocity.net, |all| {
             let rows = all.dims()[0];
             let part = |k: usize| all.clone().slice([0..rows, 3 * k..3 * k + 3]) * weights[k];
-            Param::initialized(param.id, part(0) + part(1) + part(2))
-        };
-        let output = Dense {
-            weight: summed(&output.weight),
-            bias: summed(&output.bias),
-        };
-        net.mlp.put_output(output);
-        net
+            part(0) + part(1) + part(2)
+        })
     }
 
     #[test]

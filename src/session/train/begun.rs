@@ -9,7 +9,7 @@ use crate::session::checkpoint::{self, Checkpoint};
 use crate::session::folder::RunFolder;
 use crate::session::grown::Grown;
 use crate::session::learned::{self, Frame};
-use crate::session::learner::{self, Learner};
+use crate::session::learner::Learner;
 use crate::session::lock::RunLock;
 use crate::session::log::RunLog;
 use crate::session::prepare::{self, Prepared};
@@ -112,17 +112,14 @@ impl Session {
         let run = RunFolder::open(&self.folder)?;
         let lock = run.lock()?;
         let grown = match checkpoint {
-            Some(checkpoint) => Grown::of(checkpoint, &self.recipe)?.0,
+            Some(checkpoint) => Grown::of(checkpoint, &self.recipe)?,
             None => None,
         };
         let frame = grown.map(|grown| grown.frame);
         let prepared = prepare::prepare(&self.recipe, &self.shapes, Some(&run), frame, on_event)?;
         let keyframes = &prepared.keyframes;
         let changes = match checkpoint {
-            Some(checkpoint) => {
-                learner::fits(checkpoint, &self.recipe, keyframes)?;
-                checkpoint.recipe()?.changes(&self.recipe)
-            }
+            Some(checkpoint) => checkpoint.recipe()?.changes(&self.recipe),
             None => Vec::new(),
         };
         let (recipe, engine) = (self.recipe.clone(), &*self.engine);

@@ -19,14 +19,15 @@ pub(super) fn columns(layout: Layout, rows: impl FnOnce() -> (usize, bool)) -> O
     let Layout::Tracks { k, key_frames } = layout else {
         return None;
     };
-    if key_frames < 3 {
+    if key_frames.iter().all(|count| *count < 3) {
         return None;
     }
     let (width, is_no_confidence) = rows();
-    let is_one_for_each = width == key_frames && (width > 3 || width == 3 && is_no_confidence);
+    let is_one_for_each =
+        key_frames.contains(&width) && (width > 3 || width == 3 && is_no_confidence);
     is_one_for_each.then_some(Columns {
         first: k,
-        of: key_frames,
+        of: width,
     })
 }
 
@@ -125,7 +126,7 @@ mod tests {
         let shapes = shapes(counts);
         let between = |k: usize| {
             let two = [&shapes[k], &shapes[k + 1]];
-            let found = Correspondences::read_between(&path, k, counts.len(), two);
+            let found = Correspondences::read_between(&path, k, [counts.len(); 2], two);
             found
                 .map(|found| found.pairs)
                 .map_err(|error| error.to_string())
@@ -142,6 +143,19 @@ mod tests {
         // With an index, as pandas writes it.
         let text = ",a,b,c,d\n0,0,1,2,3\n1,4,-1,5,6\n2,7,8,,nan\n";
         assert_eq!(read(text, &[9, 9, 9, 9]), wanted.map(Ok));
+    }
+
+    #[test]
+    fn a_table_is_of_all_key_frames_or_of_those_before_others_were_appended() {
+        let place = tempfile::tempdir().expect("a folder");
+        let path = place.path().join("tracks.csv");
+        let shapes = shapes(&[9; 2]);
+        let two = [&shapes[0], &shapes[1]];
+        for text in ["a,b,c,d\n0,1,2,3\n", "a,b,c\n0,1,2\n"] {
+            std::fs::write(&path, text).expect("a file");
+            let found = Correspondences::read_between(&path, 0, [4, 3], two);
+            assert_eq!(found.expect("a table").pairs, [[0, 1]], "{text}");
+        }
     }
 
     #[test]
@@ -179,7 +193,7 @@ mod tests {
         };
         let layout = Layout::Tracks {
             k: 0,
-            key_frames: 4,
+            key_frames: [4; 2],
         };
         let columns = columns(layout, || rows_of_array(&array)).expect("one for each");
         let rows = array.values.chunks_exact(4);
