@@ -2,12 +2,13 @@
 """How well `isomorph match` finds correspondences, against the true ones of the sequences.
 
     python3 scripts/matching.py [--binary PATH] [--out DIR] [--sequences DIR] [--seed S]
-                                [--only TEXT] [--table]
+                                [--only TEXT] [--cycles] [--table]
 
 Each pair of frames is matched as two meshes, the target's vertices in a random order, and as two
 clouds of 20,000 points sampled independently of each other, with normals. The program is given the
-two files and nothing else. Written to DIR: table.md and data.json. With --table the table is made
-again from data.json.
+two files and nothing else. Written to DIR: table.md and data.json. With --cycles three frames are
+matched instead, and the table is kept: whether cycles over them show which pairs are wrong. With
+--table the table is made again from data.json.
 
 Error: the distance between where a matched source vertex truly goes and the target vertex that it
 is matched with, in normalised units (mean area of the two shapes 1). Needs numpy. Exit status: 0
@@ -24,7 +25,7 @@ from pathlib import Path
 
 import numpy as np
 
-from isomorph_paper import PaperError, command_line, compact, degrade, experiments, record
+from isomorph_paper import PaperError, command_line, compact, cycles, degrade, experiments, record
 from isomorph_paper.command_line import ROOT
 from isomorph_paper.sequences import (
     Sequence,
@@ -77,6 +78,7 @@ def arguments(words: list[str]) -> argparse.Namespace:
     command_line.add_table(parser)
     add("--seed", type=int, default=0, help="of the inputs and of the matching")
     add("--only", default="", help="the rows whose name holds this text")
+    add("--cycles", action="store_true", help="measure cycles over three frames, and keep the other rows")
     options = parser.parse_args(words)
     if options.seed < 0:
         parser.error(f"--seed = {options.seed}: must be 0 or more")
@@ -164,7 +166,10 @@ def markdown(content: dict) -> str:
         cells += ["-" if value is None else form.format(value) for value, form in values]
         lines.append(f"| {' | '.join(cells)} |")
     how = record.made_by(content)
-    return "\n".join(["# matching", "", ABOUT, "", *lines, "", LEGEND, "", how, ""])
+    more = []
+    if over := content.get("cycles"):
+        more = [*cycles.markdown(over["rows"]), "", record.made_by(over), ""]
+    return "\n".join(["# matching", "", ABOUT, "", *lines, "", LEGEND, "", how, "", *more])
 
 
 def measured(options: argparse.Namespace, words: list[str]) -> dict:
@@ -188,11 +193,27 @@ def measured(options: argparse.Namespace, words: list[str]) -> dict:
     }
 
 
+def with_cycles(content: dict, options: argparse.Namespace, words: list[str]) -> dict:
+    """The same with cycles over three frames measured anew, and how they were measured."""
+    place, rows = command_line.sequences(options), []
+    for views in cycles.VIEWS:
+        for frames in cycles.FRAMES:
+            for name in cycles.SEQUENCES:
+                sequence = read_sequence(place / f"{name}.anime")
+                with tempfile.TemporaryDirectory() as folder:
+                    rows += cycles.study(options.binary, sequence, frames, views, Path(folder))
+    command = shlex.join(["scripts/matching.py", *words])
+    return {**content, "cycles": {"rows": rows, **record.of(command, options.binary)}}
+
+
 def main(words: list[str]) -> int:
     options = arguments(words)
     numbers = options.out / compact.NAME
     try:
-        content = compact.read(numbers) if options.table else measured(options, words)
+        keeps = options.table or options.cycles
+        content = compact.read(numbers) if keeps else measured(options, words)
+        if options.cycles:
+            content = with_cycles(content, options, words)
     except PaperError as error:
         print(f"matching.py: {error}", file=sys.stderr)
         return 1

@@ -13,7 +13,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 
 import matching
-from isomorph_paper import PaperError, sequences
+from isomorph_paper import PaperError, cycles, sequences
 from test_degrade import sphere
 
 # Pairs every source vertex with the target vertex at the same place but for 3 along x.
@@ -80,6 +80,37 @@ class Matching(unittest.TestCase):
         text = matching.markdown({"rows": [json.loads(json.dumps(row))], **how})
         self.assertIn("| fox 0-9 | clouds | 7 | - | 0.5000 |", text)
         self.assertIn("Made by `a command` on 2001-01-01, a processor, 2 cores.", text)
+
+    def test_a_cycle_that_does_not_close_is_dropped_and_others_stay(self):
+        x = np.arange(20.0)[:, None] * [1, 0, 0]
+        clouds = [x, x + [0, 1, 0], x + [0, 2, 0]]
+        same = np.stack([np.arange(20)] * 2, axis=1)
+        wrong = same.copy()
+        wrong[3, 1] = 7
+        for bad, check, hop in (((0, 1), cycles.first_hop, 0), ((1, 2), cycles.second_hop, 1)):
+            pairs = {each: wrong if each == bad else same for each in cycles.HOPS}
+            miss, near = check(pairs, clouds)
+            self.assertEqual(np.flatnonzero(miss > 0.5).tolist(), [3], hop)
+            self.assertEqual(near.max(), 0.0)
+        # All where the direct pairs are wrong: three pairs do not say which of them is.
+        shifted = np.stack([np.arange(20), np.roll(np.arange(20), 5)], axis=1)
+        miss, _ = cycles.first_hop({**dict.fromkeys(cycles.HOPS, same), (0, 2): shifted}, clouds)
+        self.assertGreater(miss.min(), 1.0)
+
+    def test_a_view_shows_what_faces_it(self):
+        whole, half = (cycles.seen(self.sequence, 0, view) for view in (None, 90))
+        self.assertEqual(len(whole.weights), cycles.POINTS)
+        share = len(half.weights) / cycles.POINTS
+        self.assertTrue(0.5 < share < 0.6, share)
+        # Of a sphere the half towards z.
+        self.assertGreater(half.on(self.sequence.frames[0])[:, 2].mean(), 0.2)
+
+    def test_the_table_of_cycles_names_views_and_shares(self):
+        row = {"sequence": "fox", "frames": [0, 1, 2], "views": [0, 60, 120], "hop": [1, 2], "pairs": 9, "wrong": 0.5,
+               "checked": 1.0, "dropped": 0.0, "of_them_wrong": None, "wrong_after": 0.5}
+        line = cycles.markdown([row])[-1]
+        self.assertEqual(
+            line, "| fox 0, 1, 2 | 0°, 60°, 120° | 1-2 | 9 | 50.0 % | 100.0 % | 0.0 % | - | 50.0 % |")
 
 
 if __name__ == "__main__":

@@ -105,6 +105,8 @@ pub enum Event {
     },
     /// Pairs of two shapes were found before training.
     Matched {
+        /// From which key frame to the next, counted from 0, and how often in all.
+        interval: [usize; 2],
         /// How many.
         pairs: usize,
         /// Shares of the source and of the target that have one of them near, 0 to 1.

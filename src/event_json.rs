@@ -54,12 +54,14 @@ pub(super) fn value(event: &Event) -> Value {
             "interval": interval, "intervals": intervals,
         }),
         Event::Matched {
+            interval: [interval, intervals],
             pairs,
             coverage,
             cycle: [median, most],
             seconds,
         } => json!({
-            "event": "matched", "pairs": pairs, "coverage": coverage,
+            "event": "matched", "interval": interval, "intervals": intervals,
+            "pairs": pairs, "coverage": coverage,
             "cycle": {"median": median, "quantile_95": most}, "seconds": seconds,
         }),
         Event::PhaseEntered { phase, step } => {

@@ -149,6 +149,7 @@ fn key_frames(points: &[usize]) -> String {
 /// What matching has found; `None` for any other event.
 fn matched(event: &Event) -> Option<String> {
     let Event::Matched {
+        interval: [k, intervals],
         pairs,
         coverage: [source, target],
         cycle: [median, most],
@@ -157,8 +158,12 @@ fn matched(event: &Event) -> Option<String> {
     else {
         return None;
     };
+    let between = match intervals {
+        0 | 1 => String::new(),
+        _ => format!(" from key frame {k} to {}", k + 1),
+    };
     Some(format!(
-        "matched {} in {}: near {:.0} % of the source and {:.0} % of the target; round-trip error \
+        "matched {}{between} in {}: near {:.0} % of the source and {:.0} % of the target; round-trip error \
          {median:.4} (median) and {most:.4} (95 %), normalised",
         counted(*pairs, "pair"),
         duration(*seconds),

@@ -110,16 +110,22 @@ fn an_extraction_says_what_is_wrong_with_the_surface() {
 fn the_other_events_read_like_this() {
     assert_eq!(line(&Event::Tick { step: 3 }, None), None);
     assert_eq!(text(Event::Note("two\nlines".into())), "note: two lines");
-    let matched = Event::Matched {
+    let matched = |interval| Event::Matched {
+        interval,
         pairs: 3812,
         coverage: [0.974, 1.0],
         cycle: [0.00171, 0.0123],
         seconds: 18.4,
     };
     assert_eq!(
-        text(matched),
+        text(matched([0, 1])),
         "matched 3,812 pairs in 18s: near 97 % of the source and 100 % of the target; \
          round-trip error 0.0017 (median) and 0.0123 (95 %), normalised"
+    );
+    let of_many = text(matched([2, 5]));
+    assert!(
+        of_many.starts_with("matched 3,812 pairs from key frame 2 to 3 in 18s: "),
+        "{of_many}"
     );
     let entered = Event::PhaseEntered {
         phase: Phase::WarmUp,

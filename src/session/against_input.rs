@@ -3,8 +3,11 @@
 //! All lengths are in normalised units. The limits are those that no run of the samples and of the evaluation
 //! protocol comes near; a result beyond them is not what was asked for, whatever its cause.
 
+use rayon::prelude::*;
+
 use crate::event::Event;
 use crate::geometry::density::usual_spacing;
+use crate::geometry::linear::{difference, length};
 use crate::geometry::{Mesh, NeighbourSearch, TriangleSearch};
 use crate::shape::{Keyframe, LEAST_MISSING, key_name, share_beyond};
 use crate::surface::frames::Frame;
@@ -37,6 +40,13 @@ const HOLES: i64 = 12;
 
 /// Pieces with less than this share of the area may be tips that a cell cuts off.
 const PIECE: f64 = 0.01;
+
+/// A part of a closed mesh is thin, and lost, where it lies farther outside of the surface than so many of its edges, each
+/// about as long as a cell of the grid: tips are cut short by less.
+const LOST_BEYOND: f64 = 2.0;
+
+/// The share of a closed mesh that is lost before it is said.
+const LEAST_LOST: f64 = 5e-4;
 
 /// A shape as it was given, for comparison with the surface at its time.
 pub(super) struct End {
@@ -82,6 +92,22 @@ impl End {
             cure: cure.to_owned(),
         };
         said.into_iter().map(doubtful).collect()
+    }
+
+    /// The share of a closed mesh that its surface lacks; none of other shapes, whose points may be noise.
+    fn share_lost(&self, surface: &Mesh<f32>) -> Option<f64> {
+        let search = self.mesh.as_ref().and(TriangleSearch::new(surface))?;
+        let edges = some(&surface.triangles).map(|triangle| {
+            let [a, b, _] = surface.corners(*triangle);
+            f64::from(length(difference(b, a)))
+        });
+        let most = LOST_BEYOND * mean(edges);
+        let is_lost = |x: &[f32; 3]| {
+            let closest = search.closest(*x, 0);
+            f64::from(closest.squared).sqrt() > most && !search.is_behind(&closest, *x)
+        };
+        let lost = self.points.par_iter().filter(|x| is_lost(x)).count();
+        Some(lost as f64 / self.points.len() as f64)
     }
 
     fn findings(&self, surface: &Mesh<f32>) -> Vec<(String, &'static str)> {
@@ -154,6 +180,22 @@ impl End {
             some(&surface.vertices).map(|x| search.nearest_one(wide(x)).squared_distance.sqrt());
         (mean(away) - SPACINGS * spacing).max(0.0)
     }
+}
+
+/// What is said of thin parts, such as fingers, that the cells of the grid have passed over.
+pub(super) fn lost(ends: &[End], frames: &[Frame]) -> Option<Event> {
+    let shares = ends.iter().filter_map(|end| {
+        let frame = frames.iter().find(|frame| frame.time == end.time)?;
+        Some((end.share_lost(&frame.mesh)?, frame.entry.time))
+    });
+    let (share, time) = shares.max_by(|one, other| one.0.total_cmp(&other.0))?;
+    (share > LEAST_LOST).then(|| {
+        Event::Note(format!(
+            "surfaces lack thin parts, up to {:.2} % of a shape (at {time}), as cells of the grid are larger than these; \
+             raise result.resolution, or use `isomorph extract RUN --resolution N`",
+            100.0 * share
+        ))
+    })
 }
 
 /// What a surface has otherwise than the closed mesh that it should be.
@@ -288,6 +330,25 @@ mod tests {
             assert!(said(&end(&ball, closed), &bumpy_sphere(24)).is_empty());
         }
         assert!(EdgeSharing::of(&welded(&narrow(&ball))).is_closed());
+    }
+
+    #[test]
+    fn thin_parts_that_a_surface_lacks_are_measured() {
+        let ball = bumpy_sphere(40);
+        // A needle that stands on the ball, thinner than any cell.
+        let needle = ball.moved(|[x, y, z]| [0.01 * x, 0.01 * y, 0.6 + 0.3 * z]);
+        let whole = together(&[ball.clone(), needle.clone()]);
+        let share = |mesh: &Mesh<f64>, closed, surface: &Mesh<f64>| {
+            end(mesh, closed).share_lost(&narrow(surface))
+        };
+        assert_eq!(share(&whole, true, &whole), Some(0.0));
+        assert_eq!(share(&ball, true, &bumpy_sphere(24)), Some(0.0));
+        let lost = share(&whole, true, &ball).expect("of a closed mesh");
+        assert!((lost - 0.5).abs() < 0.01, "half of the vertices: {lost}");
+        // What lies inside of the surface is hidden, not lost; the points of a cloud may be noise.
+        let hidden = together(&[ball.clone(), needle.moved(|[x, y, z]| [x, y, z - 0.6])]);
+        assert_eq!(share(&hidden, true, &ball), Some(0.0));
+        assert_eq!(share(&whole, false, &ball), None);
     }
 
     #[test]

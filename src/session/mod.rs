@@ -31,6 +31,7 @@ mod against_input;
 mod align;
 pub(crate) mod bench;
 pub(crate) mod bench_run;
+mod chain;
 pub(crate) mod checkpoint;
 mod clock;
 pub(crate) mod compare;

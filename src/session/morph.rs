@@ -221,13 +221,18 @@ impl MorphWatch {
     pub fn observe(&mut self, event: &Event) {
         match event {
             Event::Matched {
+                interval: [k, intervals],
                 coverage: [source, target],
                 cycle: [median, _],
                 ..
             } => {
+                let between = match intervals {
+                    0 | 1 => String::new(),
+                    _ => format!("from key frame {k} to key frame {}: ", k + 1),
+                };
                 if source.min(*target) < LEAST_COVERAGE {
                     let finding = format!(
-                        "pairs were found for {:.0} % of the source and {:.0} % of the target only",
+                        "{between}pairs were found for {:.0} % of the source and {:.0} % of the target only",
                         100.0 * source,
                         100.0 * target
                     );
@@ -235,7 +240,7 @@ impl MorphWatch {
                 }
                 if *median > MOST_CYCLE {
                     let finding = format!(
-                        "the pairs contradict each other: there and back misses by {median:.3} (normalised, median)"
+                        "{between}the pairs contradict each other: there and back misses by {median:.3} (normalised, median)"
                     );
                     self.doubts.push(Doubt::new(finding, GIVE_PAIRS));
                 }
@@ -366,13 +371,19 @@ mod tests {
 
     #[test]
     fn pairs_of_half_a_shape_are_named() {
-        let matched = Event::Matched {
+        let matched = |interval| Event::Matched {
+            interval,
             pairs: 10,
             coverage: [0.9, 0.5],
             cycle: [0.1, 0.2],
             seconds: 1.0,
         };
-        let found = doubts(&[matched]);
+        let found = doubts(&[matched([3, 7])]);
+        assert!(
+            found[1].starts_with("from key frame 3 to key frame 4: "),
+            "{found:?}"
+        );
+        let found = doubts(&[matched([0, 1])]);
         assert!(
             found[0].contains("90 % of the source and 50 % of the target"),
             "{found:?}"

@@ -1,20 +1,20 @@
 //! The shapes of a recipe made ready, their pairs found first where the recipe asks for it.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
 use isomorph_training::method::spline::is_solved;
 
 use super::align::{Aligned, aligned};
+use super::chain::Chain;
 use crate::error::Result;
 use crate::event::{Event, Preparation};
 use crate::formats::{self, Sequence, Shape};
-use crate::matching::{MatchOptions, Matching, match_shapes};
+use crate::matching::Matching;
 use crate::recipe::{self, Recipe};
 use crate::session::folder::RunFolder;
 use crate::shape::{
-    self, CleanOptions, Coordinates, CorrespondenceSource, Correspondences, DataOptions, Keyframes,
-    NormalSource, Normalisation, Placements,
+    self, CleanOptions, Coordinates, CorrespondenceSource, DataOptions, Keyframes, NormalSource,
+    Normalisation, Placements,
 };
 use crate::solved::sheet_thickness;
 
@@ -74,7 +74,7 @@ pub(super) fn shape_of(
 /// file exists. If `frame` is given, the first so many shapes decide the normalisation.
 ///
 /// # Errors
-/// What [`shape::prepare`] and [`match_shapes`] refuse.
+/// What [`shape::prepare`] and [`Chain::new`] refuse.
 pub(super) fn prepare(
     recipe: &Recipe,
     shapes: &[Shape],
@@ -88,24 +88,11 @@ pub(super) fn prepare(
         notes,
     } = aligned(recipe, shapes)?;
     let shapes = &shapes[..];
-    let intervals = recipe.data.between.len();
-    let mut between = Vec::with_capacity(intervals);
-    let mut found = BTreeMap::new();
-    let known = recipe.data.between.iter().zip(shapes.windows(2));
-    for (k, (known, shapes)) in known.enumerate() {
-        between.push(match known {
-            recipe::Correspondences::None => CorrespondenceSource::None,
-            recipe::Correspondences::SameVertices => CorrespondenceSource::SameVertices,
-            recipe::Correspondences::File(path) => CorrespondenceSource::File(path.clone()),
-            recipe::Correspondences::Match => {
-                let stored = stored.map(|run| run.found_pairs(k, intervals));
-                let interval = [k, intervals];
-                let (known, matching) = matched(recipe, shapes, interval, stored.as_deref(), emit)?;
-                found.extend(matching.map(|matching| (k, matching)));
-                CorrespondenceSource::Pairs(known)
-            }
-        });
-    }
+    let Chain {
+        between,
+        found,
+        notes: alone,
+    } = Chain::new(recipe, shapes, stored, emit)?;
     emit(&Event::Preparing(Preparation::Points));
     let first = frame.map(|count| &shapes[..count.min(shapes.len())]);
     let first = first.map(|shapes| Normalisation::joint(&shapes.iter().collect::<Vec<_>>()));
@@ -116,48 +103,15 @@ pub(super) fn prepare(
         keyframes.placements = Placements::new(&to_files, &options.times, centre);
     }
     keyframes.notes.extend(notes);
+    keyframes.notes.extend(alone);
     if is_solved(recipe) {
         emit(&Event::Preparing(Preparation::Distances));
     }
     Ok(Prepared {
         keyframes,
         found,
-        intervals,
+        intervals: recipe.data.between.len(),
     })
-}
-
-/// The pairs of two shapes: those of an earlier search if they are there, else found now.
-fn matched(
-    recipe: &Recipe,
-    shapes: &[Shape],
-    interval: [usize; 2],
-    stored: Option<&Path>,
-    emit: &mut dyn FnMut(&Event),
-) -> Result<(Correspondences, Option<Matching>)> {
-    let (source, target) = (&shapes[0], &shapes[1]);
-    if let Some(path) = stored.filter(|path| path.is_file()) {
-        return Ok((Correspondences::read(path, source, target)?, None));
-    }
-    let options = MatchOptions {
-        points: recipe.data.points,
-        seed: recipe.training.seed,
-        ..MatchOptions::default()
-    };
-    let found = match_shapes(
-        source,
-        target,
-        &Correspondences::none(),
-        &options,
-        &mut |stage, done, total| {
-            emit(&Event::Matching {
-                stage,
-                done,
-                total,
-                interval,
-            });
-        },
-    )?;
-    Ok((found.correspondences(), Some(found)))
 }
 
 /// Makes the shapes of a recipe ready where only their points count: no pairs are read or found. They lie on each other
@@ -228,6 +182,7 @@ impl Prepared {
             found.write_csv(&run.pairs(*k, self.intervals))?;
             let (coverage, cycle) = (&found.coverage, &found.cycle.source);
             events.push(Event::Matched {
+                interval: [*k, self.intervals],
                 pairs: found.pairs.len(),
                 coverage: [coverage.source, coverage.target],
                 cycle: [cycle.median, cycle.quantile_95],

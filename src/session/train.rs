@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use isomorph_training::engine::{Engine, Trainer};
 
 use self::begun::Begun;
+use super::against_input;
 use super::checkpoint::{Checkpoint, CheckpointError};
 use super::folder::RunFolder;
 use super::grown::{self, Appended};
@@ -322,7 +323,8 @@ impl Session {
                 ]
             });
             let said = begun.ends.iter().flat_map(|end| end.contradicted(&frames));
-            for event in unsupported.flatten().chain(said) {
+            let lost = against_input::lost(&begun.ends, &frames);
+            for event in unsupported.flatten().chain(lost).chain(said) {
                 on_event(&event);
                 log.record(&event)?;
             }

@@ -258,13 +258,25 @@ pub(crate) fn prepare(shapes: &[Shape], options: &DataOptions) -> Result<Keyfram
     for (k, shape) in shapes.iter().enumerate() {
         keys.push(key_frame(k, shape, options, &normalisation, &mut notes)?);
     }
-    for (k, pairs) in between.iter().enumerate() {
+    for (k, pairs) in between.iter_mut().enumerate() {
         // Normals as they are given need not be on one side.
         let are_outward = matches!(options.normals, NormalSource::Auto | NormalSource::Estimate);
         let clouds = are_outward.then(|| [&keys[k].cloud, &keys[k + 1].cloud]);
-        if !options.mirrored && mismatch::is_mirror(fit_mirrors[k], pairs, clouds) {
-            return Err(mirrored([&shapes[k], &shapes[k + 1]]));
+        if options.mirrored || !mismatch::is_mirror(fit_mirrors[k], pairs, clouds) {
+            continue;
         }
+        let error = mirrored([&shapes[k], &shapes[k + 1]]);
+        // Pairs that nobody gave do not stop a motion that others lead.
+        let is_found = matches!(options.between[k], CorrespondenceSource::Pairs(_));
+        if !is_found || keys.len() == 2 {
+            return Err(error);
+        }
+        pairs.clear();
+        confidence[k].clear();
+        notes.push(format!(
+            "from key frame {k} to key frame {} the surfaces alone lead, without the pairs that were found: {error}",
+            k + 1
+        ));
     }
     let boxes = keys.iter().map(|key| Bounds::of(&key.cloud.points));
     let bounds = boxes.reduce(|all, next| all.union(&next));

@@ -19,7 +19,8 @@ pub(crate) fn difference(found: &Value, like: &Value) -> Option<String> {
 
 /// What is no part of an optimiser's state for the network whose record is `net`, in words.
 ///
-/// Its entries belong to parameters of the network, and every array in one has the shape of that parameter.
+/// Its entries belong to parameters of the network. One is of as many axes as its parameter, every array in it has the
+/// shape of that parameter, and it holds no other list.
 pub(crate) fn stray_state(state: &Value, net: &Value) -> Option<String> {
     let mut shapes = Vec::new();
     parameters(net, &mut shapes);
@@ -32,7 +33,11 @@ pub(crate) fn stray_state(state: &Value, net: &Value) -> Option<String> {
         let Some((_, array)) = known else {
             return Some(format!("{id:?} is no parameter of the network"));
         };
-        arrays_like(state, array).map(|what| format!("the state of parameter {id}: {what}"))
+        let problem = match of_rank(state, array) {
+            Some(state) => arrays_like(state, array),
+            None => Some("has another number of axes".to_owned()),
+        };
+        problem.map(|what| format!("the state of parameter {id}: {what}"))
     })
 }
 
@@ -95,7 +100,15 @@ fn unlike_arrays(found: &Value, like: &Value) -> Option<String> {
     (bytes(found) != bytes(like)).then(|| "holds too few or too many numbers".to_owned())
 }
 
-/// The first array in a state that is not like this one.
+/// What burn wrote in the variant of a state for arrays of as many axes as this one has, if that is the only variant.
+fn of_rank<'a>(state: &'a Value, array: &Value) -> Option<&'a Value> {
+    let axes = field(array, "shape")?.as_array()?.len();
+    let variants = field(state, "V1")?;
+    (variants.as_map()?.len() == 1).then_some(())?;
+    field(variants, &format!("Rank{axes}"))
+}
+
+/// The first array in a state that is not like this one, or a list that is no array.
 fn arrays_like(state: &Value, like: &Value) -> Option<String> {
     if field(state, "bytes").is_some() {
         return unlike_arrays(state, like);
@@ -104,7 +117,7 @@ fn arrays_like(state: &Value, like: &Value) -> Option<String> {
         Value::Map(entries) => entries
             .iter()
             .find_map(|(_, value)| arrays_like(value, like)),
-        Value::Array(values) => values.iter().find_map(|value| arrays_like(value, like)),
+        Value::Array(_) | Value::Binary(_) => Some("holds a list that is no array".to_owned()),
         _ => None,
     }
 }

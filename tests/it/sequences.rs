@@ -367,6 +367,49 @@ fn a_sequence_that_was_stopped_ends_in_the_same_field() {
 }
 
 #[test]
+fn an_interval_without_pairs_is_named_and_the_others_stand() {
+    let _turn = turn();
+    let place = falling(&[0, 1]);
+    // Eight corners, and no vertex of a sphere comes near one of them.
+    let cube = Mesh::bar([1.6; 3], 1.6).map(|[x, y, z]| [x, y, z - 0.2]);
+    place.write("scan-2.ply", ply::text(&cube));
+    place.write(
+        "recipe.toml",
+        "preset = \"instant\"\n[data]\nsequence = \"scan-*.ply\"\ncorrespondences = \"match\"\n\
+         [checkpoint]\nevery = 2\nkeep = 9\n",
+    );
+    let train = ["train", "recipe.toml", "--set", "result.frames=0", "--run"];
+    let trained = place
+        .isomorph(&[&train[..], &["run"], &SMALL].concat())
+        .succeeded()
+        .stderr;
+    for part in [
+        "pairs from key frame 0 to 1 in ",
+        "from key frame 1 to key frame 2 the surfaces alone lead, without pairs: ",
+        "scan-2.ply: no pair of vertices",
+    ] {
+        assert!(trained.contains(part), "{part:?} in {trained}");
+    }
+    let whole = place.run("run");
+    let stored = [0, 1].map(|k| whole.path(&format!("pairs-000{k}.csv")).is_file());
+    assert_eq!(stored, [true, false]);
+    // It goes on in the same way.
+    let cut = place.run("cut");
+    whole.cut_at(4, &cut);
+    fs::copy(whole.path("pairs-0000.csv"), cut.path("pairs-0000.csv")).expect("copied");
+    place.isomorph(&["resume", "cut", "--quiet"]).succeeded();
+    assert!(
+        cut.networks() == whole.networks(),
+        "the same field, bit for bit"
+    );
+    // Where nothing else leads, there is no run.
+    place
+        .isomorph(&[&train[..], &["two", "--set", "data.keys=[1, 2]"], &SMALL].concat())
+        .refused(1, &["scan-2.ply: no pair of vertices"]);
+    assert!(!place.path("two").exists());
+}
+
+#[test]
 fn splines_and_shapes_are_exported_with_a_description() {
     let _turn = turn();
     let place = falling(&[0, 1, 3]);

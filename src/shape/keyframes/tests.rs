@@ -281,6 +281,38 @@ fn pairs_that_mirror_the_shape_are_refused_unless_that_is_meant() {
 }
 
 #[test]
+fn pairs_that_were_found_and_mirror_one_of_many_are_left_out() {
+    let mut files = tetrahedra();
+    let points = sphere_cloud(500, 2.0, 31);
+    let bent: Vec<_> = points
+        .iter()
+        .map(|[x, y, z]| [*x, *y, z + 0.3 * x * y])
+        .collect();
+    let mirrored: Vec<_> = bent.iter().map(|[x, y, z]| [-x, *y, *z]).collect();
+    write_cloud(&files.source, &bent, None);
+    write_cloud(&files.target, &mirrored, None);
+    let [bent, mirrored] =
+        [&files.source, &files.target].map(|path| crate::formats::read(path).expect("a shape"));
+    let known = Correspondences::same_vertices(&bent, &mirrored).expect("pairs");
+    let found = CorrespondenceSource::Pairs(known);
+    files.options.times = vec![0.0, 0.5, 1.0];
+    files.options.between = vec![found.clone(), found.clone()];
+    let three = [bent.clone(), bent, mirrored];
+    let keyframes = prepare(&three, &files.options).expect("the other interval stands");
+    assert_eq!(
+        [keyframes.between[0].len(), keyframes.between[1].len()],
+        [25, 0]
+    );
+    let said = "from key frame 1 to key frame 2 the surfaces alone lead, without the pairs that were found: the pairs mirror";
+    let notes = &keyframes.notes;
+    assert!(notes.iter().any(|note| note.starts_with(said)), "{notes:?}");
+    // Pairs that are given are refused as ever.
+    files.options.between[1] = CorrespondenceSource::SameVertices;
+    let error = prepare(&three, &files.options).expect_err("mirrored");
+    assert!(error.to_string().contains("the pairs mirror"), "{error}");
+}
+
+#[test]
 fn a_target_in_another_unit_is_said_to_be() {
     let files = tetrahedra();
     let points = sphere_cloud(500, 2.0, 31);
