@@ -99,7 +99,7 @@ impl End {
         let search = self.mesh.as_ref().and(TriangleSearch::new(surface))?;
         let edges = some(&surface.triangles).map(|triangle| {
             let [a, b, _] = surface.corners(*triangle);
-            f64::from(length(difference(b, a)))
+            length(difference(b, a))
         });
         let most = LOST_BEYOND * mean(edges);
         let is_lost = |x: &[f32; 3]| {
