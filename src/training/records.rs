@@ -357,7 +357,7 @@ mod tests {
         for name in ["Rank3", "Rank0", "Rank9"] {
             let found = problem("adam.mpk", &["item"], |value| {
                 first(value, &|(_, state)| {
-                    renamed(field_mut(state, "V1"), "Rank2", name)
+                    renamed(field_mut(state, "V1"), "Rank2", name);
                 });
             });
             assert!(
