@@ -403,8 +403,9 @@ fn an_interval_without_pairs_is_named_and_the_others_stand() {
         "the same field, bit for bit"
     );
     // Where nothing else leads, there is no run.
+    let two = ["two", "--quiet", "--set", "data.keys=[1, 2]"];
     place
-        .isomorph(&[&train[..], &["two", "--set", "data.keys=[1, 2]"], &SMALL].concat())
+        .isomorph(&[&train[..], &two, &SMALL].concat())
         .refused(1, &["scan-2.ply: no pair of vertices"]);
     assert!(!place.path("two").exists());
 }
