@@ -111,6 +111,8 @@ class Run:
         if self.splines:
             return self._spline(x, t, part or self._part(t)[1])
         about = self.about["networks"]["velocity"]
+        if "cells" in about:
+            return self._trained_spline(x, t, about)
         features = self._encoded(x, about["frequencies"])
         if self.intervals:
             return self._in_turns(self._mlp("velocity", features), t, part or self._part(t)[1])
@@ -132,21 +134,32 @@ class Run:
         v = np.einsum("nka,k->na", outputs[:, first : first + 9].reshape(-1, 3, 3), weights)
         return v / (part["to"] - part["from"])
 
+    def _trained_spline(self, x: np.ndarray, t: float, grid: dict) -> np.ndarray:
+        """Splines beside end fields that are networks: of the polynomials 1 and 2 t - 1."""
+        c = self.arrays["velocity.coefficients"].reshape(*grid["nodes"], -1, 3)
+        functions = np.array([1.0, 2 * t - 1])[: c.shape[3]]
+        return self._on_grid(x, np.einsum("xyzka,k->xyza", c, functions), grid)
+
     def _spline(self, x: np.ndarray, t: float, part: dict) -> np.ndarray:
-        """Quadratic B-splines in space, polynomials in the interval's own time."""
+        """Polynomials in the interval's own time."""
         c = self.arrays[f"velocity.{self.intervals.index(part)}.coefficients"]
         own = (t - part["from"]) / (part["to"] - part["from"])
         c = np.einsum("xyzka,k->xyza", c, np.array(part["time_functions"]) @ own ** np.arange(3))
-        place = np.clip((x - part["lower"]) / part["spacing"], 0, part["cells"])
-        cell = np.minimum(place.astype(int), np.array(part["cells"]) - 1)
+        # The coefficients are of the interval's own time.
+        return self._on_grid(x, c, part) / (part["to"] - part["from"])
+
+    @staticmethod
+    def _on_grid(x: np.ndarray, c: np.ndarray, grid: dict) -> np.ndarray:
+        """Quadratic B-splines with coefficients `[nodes x, nodes y, nodes z, 3]`."""
+        place = np.clip((x - grid["lower"]) / grid["spacing"], 0, grid["cells"])
+        cell = np.minimum(place.astype(int), np.array(grid["cells"]) - 1)
         u = place - cell
         weights = np.stack([(1 - u) ** 2 / 2, 0.5 + u * (1 - u), u**2 / 2])
         v = np.zeros((len(x), 3))
         for i, j, k in np.ndindex(3, 3, 3):
             share = weights[i, :, 0] * weights[j, :, 1] * weights[k, :, 2]
             v += share[:, None] * c[cell[:, 0] + i, cell[:, 1] + j, cell[:, 2] + k]
-        # The coefficients are of the interval's own time.
-        return v / (part["to"] - part["from"])
+        return v
 
     def _blend(self, x: np.ndarray, t: float) -> np.ndarray:
         """The distances of the shapes before and after, where the point comes from and goes to."""

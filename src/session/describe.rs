@@ -3,8 +3,8 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use isomorph_training::method::spec_of;
 use isomorph_training::method::spline::{self, is_solved};
+use isomorph_training::method::{self, spec_of};
 
 use super::checkpoint::{self, Checkpoint, State};
 use super::folder::RunFolder;
@@ -155,12 +155,8 @@ fn key_frames(text: &mut String, state: &State, recipe: &Recipe) -> std::fmt::Re
 /// What `f` and `V` are.
 fn fields(text: &mut String, recipe: &Recipe) -> std::fmt::Result {
     if is_solved(recipe) {
-        let spacing = spline::keys(recipe).spacing;
         writeln!(text, "f            the shapes themselves")?;
-        writeln!(
-            text,
-            "V            splines, in cells of {spacing}, normalised"
-        )?;
+        writeln!(text, "V            {}", splines(recipe))?;
     } else if !spec_of(recipe).is_baseline {
         let (f, v) = (&recipe.implicit, &recipe.velocity);
         writeln!(
@@ -168,11 +164,19 @@ fn fields(text: &mut String, recipe: &Recipe) -> std::fmt::Result {
             "f            {} x {}, {}",
             f.depth, f.width, f.activation
         )?;
-        writeln!(
-            text,
-            "V            {} x {}, {}",
-            v.depth, v.width, v.activation
-        )?;
+        match method::starts_solved(recipe) {
+            true => writeln!(text, "V            {}", splines(recipe))?,
+            false => writeln!(
+                text,
+                "V            {} x {}, {}",
+                v.depth, v.width, v.activation
+            )?,
+        }
     }
     Ok(())
+}
+
+fn splines(recipe: &Recipe) -> String {
+    let spacing = spline::keys(recipe).spacing;
+    format!("splines, in cells of {spacing}, normalised")
 }

@@ -7,8 +7,8 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use isomorph_training::method::spec_of;
 use isomorph_training::method::spline::is_solved;
+use isomorph_training::method::{self, spec_of};
 use isomorph_training::weights::{IntervalWeights, Weights};
 use safetensors::tensor::{Dtype, TensorView, serialize};
 use serde_json::{Value, json};
@@ -154,21 +154,34 @@ fn described(recipe: &Recipe, checkpoint: &Checkpoint, weights: &Weights) -> Val
         "depth": f.depth, "activation": f.activation.to_string(), "beta": f.beta,
         "frequencies": f.frequencies, "skip": f.skip, "sphere_radius": f.sphere_radius,
     });
-    let mut networks = json!({"velocity": {
-        "depth": v.depth, "activation": v.activation.to_string(), "beta": v.beta,
-        "frequencies": v.frequencies, "skip": v.skip, "time_dependent": v.time_dependent,
-    }});
+    let velocity = match weights.grid {
+        // `coefficients` are `[nodes, 3 K]`, of the polynomials 1 and 2 t - 1, K of them.
+        Some(grid) => json!({
+            "lower": grid.lower, "spacing": grid.spacing, "cells": grid.cells,
+            "nodes": grid.nodes(),
+        }),
+        None => json!({
+            "depth": v.depth, "activation": v.activation.to_string(), "beta": v.beta,
+            "frequencies": v.frequencies, "skip": v.skip, "time_dependent": v.time_dependent,
+        }),
+    };
+    let mut networks = json!({ "velocity": velocity });
     let of = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
-    let names: Vec<String> = match (recipe.implicit.geometry, recipe.data.keyframes.len()) {
-        (GeometryKind::Network, _) => of(&["implicit"]),
-        (GeometryKind::Flow, 2) => of(&["source", "target"]),
-        (GeometryKind::Flow, keys) => (0..keys).map(|k| format!("end.{k:04}")).collect(),
+    let has_end_fields = method::has_end_fields(recipe);
+    let names: Vec<String> = match (has_end_fields, recipe.data.keyframes.len()) {
+        (false, _) => of(&["implicit"]),
+        (true, 2) => of(&["source", "target"]),
+        (true, keys) => (0..keys).map(|k| format!("end.{k:04}")).collect(),
     };
     for name in names {
         networks[name] = field.clone();
     }
     let mut about = frame(recipe, checkpoint);
-    about["geometry"] = json!(recipe.implicit.geometry.to_string());
+    let geometry = match has_end_fields {
+        true => GeometryKind::Flow,
+        false => GeometryKind::Network,
+    };
+    about["geometry"] = json!(geometry.to_string());
     about["flow_steps"] = json!(weights.flow_steps);
     if !weights.intervals.is_empty() {
         let interval = |of: &IntervalWeights| {

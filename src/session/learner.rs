@@ -92,6 +92,9 @@ impl Learner {
         if is_guided || method::has_end_fields(&recipe) && is_partial {
             match guide(&recipe, keyframes) {
                 Ok(found) => notes.extend(guided(&mut data, found, keyframes, is_guided)),
+                Err(reason) if method::starts_solved(&recipe) => {
+                    return Err(LearnerError::Unsolved(reason));
+                }
                 Err(reason) => {
                     networks.training.guided_until = 0.0;
                     notes.extend(unguided(&reason, is_guided, is_partial));
@@ -104,12 +107,15 @@ impl Learner {
             data.keys.clear();
             data.between.clear();
         }
-        let trainer: Box<dyn Trainer> = if is_solved {
+        let mut trainer: Box<dyn Trainer> = if is_solved {
             let solved = Solved::new(&networks, keyframes).map_err(LearnerError::Unsolved)?;
             Box::new(solved)
         } else {
             engine.method(&networks, &data.bounds)?
         };
+        if let Some(guide) = &data.guide {
+            trainer.take(&**guide);
+        }
         notes.extend(self_test::before_training(engine, &recipe)?);
         // A solver of our own, which no backend takes part in.
         let (backend, device) = match is_solved {

@@ -30,6 +30,10 @@ impl Guide for SplineGuide {
         self.field
             .carry_each(places, from, to, self.trajectory_steps)
     }
+
+    fn splines(&self) -> Option<&SplineField> {
+        Some(&self.field)
+    }
 }
 
 /// A solved field through many key frames, and in how many steps its paths are followed from one to the next.
@@ -115,15 +119,17 @@ pub(crate) struct Guidance {
 }
 
 /// Keys of the steps, which the recipe's own say nothing of, between two shapes and through more.
-const OF_STEPS: [[&str; 4]; 2] = [
+const OF_STEPS: [[&str; 5]; 2] = [
     [
         "preset=instant",
+        "velocity.kind=spline",
         "training.steps=18",
         "training.time-steps=3",
         "training.correspondence-batch=1000",
     ],
     [
         "preset=instant",
+        "velocity.kind=spline",
         "training.steps=10",
         "training.time-steps=1",
         "training.correspondence-batch=1000",
@@ -132,7 +138,10 @@ const OF_STEPS: [[&str; 4]; 2] = [
 
 /// Why no splines can stand in for the motion that a recipe asks for, if so.
 fn misfit(recipe: &Recipe) -> Option<&'static str> {
-    if !recipe.velocity.time_dependent {
+    if method::starts_solved(recipe) {
+        // What splines have no term for is trained for after them.
+        None
+    } else if !recipe.velocity.time_dependent {
         Some("splines depend on time, and velocity.time-dependent is false")
     } else if recipe.loss.smoothness > 0.0 {
         Some("splines have no term for loss.smoothness")

@@ -4,6 +4,7 @@
 use std::num::NonZeroUsize;
 use std::sync::{Arc, OnceLock};
 
+use isomorph_spline::SplineField;
 use serde::{Deserialize, Serialize};
 
 use crate::hollows::Hollows;
@@ -83,6 +84,11 @@ pub trait Guide: Send + Sync {
 
     /// Where places at the times `from` are at the times `to`.
     fn carried(&self, places: &[[f32; 3]], from: &[f32], to: &[f32]) -> Vec<[f32; 3]>;
+
+    /// The field itself, if it is one of splines between two key frames.
+    fn splines(&self) -> Option<&SplineField> {
+        None
+    }
 }
 
 /// A part of a guide, over a time from 0 to 1.

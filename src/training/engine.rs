@@ -16,7 +16,7 @@ use burn::tensor::backend::Backend;
 use burn::tensor::{Distribution, Tensor};
 use isomorph_model::{TrainBackend, product};
 
-use crate::data::{Bounds, TrainingData};
+use crate::data::{Bounds, Guide, TrainingData};
 use crate::deformation::{Deformation, OnHost};
 use crate::in_turns::{InTurns, Kept};
 use crate::method::{self, Method, Through};
@@ -108,6 +108,9 @@ pub trait Trainer {
     /// # Errors
     /// [`RecordError`] if one is missing or is not of this method.
     fn restore(&mut self, records: &Records) -> Result<(), RecordError>;
+
+    /// Starts with a velocity field that is there already: see [`Method::take`].
+    fn take(&mut self, _: &dyn Guide) {}
 
     /// Takes what a run through the first `known` key frames has learned, and goes on with further ones.
     ///
@@ -321,6 +324,10 @@ impl<B: TrainBackend> Trainer for InTraining<B> {
 
     fn restore(&mut self, records: &Records) -> Result<(), RecordError> {
         self.method.restore(records)
+    }
+
+    fn take(&mut self, guide: &dyn Guide) {
+        self.method.take(guide);
     }
 
     fn grow(&mut self, records: &Records, known: usize) -> Result<(), RecordError> {

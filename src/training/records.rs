@@ -8,6 +8,7 @@ use std::io;
 use burn::record::{FullPrecisionSettings, NamedMpkBytesRecorder, Record, Recorder};
 use burn::tensor::backend::Backend;
 use rmpv::Value;
+use serde::de::DeserializeOwned;
 
 use crate::alike;
 
@@ -102,6 +103,23 @@ impl Records {
         let recorder = NamedMpkBytesRecorder::<FullPrecisionSettings>::default();
         Recorder::<B>::load(&recorder, self.known(name)?.to_vec(), device)
             .map_err(|error| RecordError::new(name, error.to_string()))
+    }
+
+    /// An entry of a network's record that is no array of numbers, such as a grid.
+    ///
+    /// # Errors
+    /// [`RecordError`] if the record or the entry is not there, or is of another kind.
+    pub(crate) fn constant<T: DeserializeOwned>(
+        &self,
+        name: &str,
+        entry: &str,
+    ) -> Result<T, RecordError> {
+        let record = self.value(name)?;
+        let item = alike::field(&record, "item");
+        let found = item.and_then(|item| alike::field(item, entry));
+        let missing = || RecordError::new(name, format!("{entry} is missing"));
+        rmpv::ext::from_value(found.ok_or_else(missing)?.clone())
+            .map_err(|error| RecordError::new(name, format!("{entry}: {error}")))
     }
 
     /// The bytes of a record, if it is there.

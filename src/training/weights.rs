@@ -4,6 +4,7 @@
 use burn::module::{Module, ModuleVisitor, Param};
 use burn::tensor::Tensor;
 use burn::tensor::backend::Backend;
+use isomorph_model::SplineGrid;
 
 /// An array of weights.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,6 +24,8 @@ pub struct Weights {
     pub tensors: Vec<NamedTensor>,
     /// Steps of the integrator over all of time, where a flow carries the geometry between two key frames.
     pub flow_steps: Option<usize>,
+    /// The grid of the velocity's coefficients, where it is of splines.
+    pub grid: Option<SplineGrid>,
     /// From each key frame to the next, where there are more than two.
     pub intervals: Vec<IntervalWeights>,
 }

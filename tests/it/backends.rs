@@ -72,8 +72,16 @@ const ORNATE_SHIPPED: &[&str] = &[
     "training.time-steps = 3",
 ];
 
+/// Splines as V, trained from the first step on.
+const TRAINED_SPLINE: &[&str] = &[
+    "velocity.kind = \"trained-spline\"",
+    "spline.spacing = 0.1",
+    "spline.band = 2000",
+    "spline.surface-samples = 50",
+];
+
 /// What is compared, with its name.
-fn cases() -> [(&'static str, Vec<&'static str>); 5] {
+fn cases() -> [(&'static str, Vec<&'static str>); 6] {
     [
         ("shipped", SHIPPED.to_vec()),
         ("shipped, without splines", vec![WITHOUT_SPLINES]),
@@ -83,12 +91,19 @@ fn cases() -> [(&'static str, Vec<&'static str>); 5] {
             [ORNATE, ORNATE_SHIPPED, &[WITHOUT_SPLINES]].concat(),
         ),
         ("ornate network", [NETWORK, ORNATE, ORNATE_NETWORK].concat()),
+        (
+            "trained spline",
+            [TRAINED_SPLINE, SMOOTH, &[WITHOUT_SPLINES]].concat(),
+        ),
     ]
 }
 
 /// The logged steps of a run with these keys.
 fn logged(keys: &[&str], backend: &str, derivatives: &str) -> Vec<Logged> {
-    let place = Workplace::tiny(&[keys, PHASES].concat());
+    // Splines have no units.
+    let units = |key: &&&str| !(keys.contains(&TRAINED_SPLINE[0]) && key.starts_with("velocity"));
+    let phases: Vec<&str> = PHASES.iter().filter(units).copied().collect();
+    let place = Workplace::tiny(&[keys, &phases].concat());
     let set = format!("training.derivatives={derivatives}");
     let run = place.train("run", &["--backend", backend, "--set", &set]);
     let made_by = run.state()["backend"].as_str().expect("a name").to_owned();

@@ -23,8 +23,8 @@ pub(crate) struct Method {
     pub(crate) has_motion: bool,
 }
 
-/// Ours as it ships, the paper's geometry, splines, and every other `method.name`.
-pub(crate) const METHODS: [Method; 11] = [
+/// Ours as it ships, the paper's geometry, splines, these beside networks, and every other `method.name`.
+pub(crate) const METHODS: [Method; 12] = [
     Method {
         name: "shipped",
         keys: &[],
@@ -41,6 +41,18 @@ pub(crate) const METHODS: [Method; 11] = [
         name: "spline",
         keys: &[
             "velocity.kind = \"spline\"",
+            "spline.band = 2000",
+            "spline.surface-samples = 50",
+        ],
+        has_field: true,
+        has_motion: true,
+    },
+    Method {
+        name: "trained-spline",
+        keys: &[
+            "velocity.kind = \"trained-spline\"",
+            "training.guided-until = 0.4",
+            "spline.spacing = 0.1",
             "spline.band = 2000",
             "spline.surface-samples = 50",
         ],
@@ -119,7 +131,7 @@ impl Method {
                 "training.correspondence-batch = 40",
             ],
             "spline" | "eigenbasis" => &["training.correspondence-batch = 40"],
-            "efis" => &[
+            "trained-spline" | "efis" => &[
                 "implicit.depth = 3",
                 "implicit.width = 32",
                 "training.batch = 200",

@@ -53,6 +53,14 @@ impl<R: Real> SplineField<R> {
         Ok(Self::zero(grid, basis))
     }
 
+    /// The field that is zero, on a grid.
+    ///
+    /// # Errors
+    /// If the grid is none, or has too many nodes.
+    pub fn at_rest_on(grid: Grid<R>, basis: TimeBasis) -> Result<Self, SplineError> {
+        Ok(Self::zero(grid.checked()?, basis))
+    }
+
     /// The field of these coefficients, as [`Self::coefficients`] gives them.
     ///
     /// # Errors
@@ -62,7 +70,7 @@ impl<R: Real> SplineField<R> {
         basis: TimeBasis,
         coefficients: &[R],
     ) -> Result<Self, SplineError> {
-        let mut out = Self::zero(grid.checked()?, basis);
+        let mut out = Self::at_rest_on(grid, basis)?;
         let wanted = out.nodes.len() * basis.functions() * 3;
         check_coefficients(coefficients, wanted)?;
         let each = coefficients.chunks_exact(basis.functions() * 3);

@@ -25,7 +25,7 @@ pub struct SplineGrid {
 
 impl SplineGrid {
     /// Nodes along each axis.
-    pub(crate) fn nodes(&self) -> [usize; 3] {
+    pub fn nodes(&self) -> [usize; 3] {
         self.of_field().nodes()
     }
 

@@ -71,6 +71,19 @@ impl<B: Backend> SplineVelocity<B> {
         }
     }
 
+    /// The field that is zero, on a grid.
+    ///
+    /// # Errors
+    /// If the grid is none, or has too many nodes.
+    pub fn at_rest(
+        grid: SplineGrid,
+        basis: TimeBasis,
+        device: &B::Device,
+    ) -> Result<Self, SplineError> {
+        let field = SplineField::at_rest_on(grid.of_field(), basis)?;
+        Ok(Self::from_field(&field, device))
+    }
+
     /// The same field as the package `isomorph-spline` has it, with the same numbers.
     ///
     /// # Errors

@@ -3,15 +3,17 @@
 
 use std::io;
 
-use burn::module::Module;
+use burn::module::{AutodiffModule, Module, ParamId};
 use isomorph_model::flow::end_fields::{EndFields, EndFieldsConfig};
 use isomorph_model::operators::VelocityField;
-use isomorph_model::{FlowGeometry, Geometry, Objective, TrainBackend, VelocityNet};
+use isomorph_model::{
+    FlowGeometry, Geometry, ModelBackend, Objective, SplineGrid, TrainBackend, VelocityNet,
+};
 
 use super::ends::OnDevice;
 use super::spec::{Acts, Keys, MethodSpec, Needs};
 use super::{FIXED_OPTIMISER, Method, Trainee, spec_of};
-use crate::data::{Bounds, TrainingData};
+use crate::data::{Bounds, Guide, TrainingData};
 use crate::flow_step::FlowStep;
 use crate::guided::Guided;
 use crate::motion::Motion;
@@ -65,26 +67,85 @@ pub(super) fn is_guided(recipe: &Recipe, step: usize) -> bool {
 /// Points to a side of the lattice that decides how finely the geometry follows the flow.
 const PROBES: usize = 24;
 
-/// The end fields, the Velocity-Net and how they are trained.
-pub(super) struct EndsAndFlow<B: TrainBackend> {
+/// What may be the `V` of a flow between two shapes.
+pub(super) trait FlowVelocity<B: TrainBackend>:
+    AutodiffModule<B, InnerModule: VelocityOfFlow<B::InnerBackend>> + VelocityField<B> + Sync + 'static
+{
+    /// Whether it is the guide in the steps that are guided, and does not learn from it.
+    const IS_GUIDE: bool;
+
+    /// As the recipe's seed makes it; `bounds` encloses both shapes.
+    fn new(settings: &Settings, bounds: &Bounds, device: &B::Device) -> Self;
+
+    /// The matrices that Muon moves.
+    fn hidden_weights(&self) -> Vec<ParamId>;
+
+    /// The guide itself, where that is one of its kind.
+    fn of_guide(_: &dyn Guide, _: &B::Device) -> Option<Self> {
+        None
+    }
+
+    /// One of the form of the record of this name.
+    ///
+    /// # Errors
+    /// [`RecordError`] if that record says none.
+    fn like_record(&self, _: &Records, _name: &str, _: &B::Device) -> Result<Self, RecordError> {
+        Ok(self.clone())
+    }
+
+    /// Its grid, if it has one.
+    fn grid(&self) -> Option<SplineGrid> {
+        None
+    }
+}
+
+/// What carries points and fields.
+pub(super) trait VelocityOfFlow<B: ModelBackend>:
+    VelocityField<B> + isomorph_model::Motion<B> + Clone + 'static
+{
+}
+
+impl<B: ModelBackend, V: VelocityField<B> + isomorph_model::Motion<B> + Clone + 'static>
+    VelocityOfFlow<B> for V
+{
+}
+
+impl<B: TrainBackend> FlowVelocity<B> for VelocityNet<B> {
+    const IS_GUIDE: bool = false;
+
+    fn new(settings: &Settings, _: &Bounds, device: &B::Device) -> Self {
+        // The end fields take `seed` and the one after it.
+        let seed = settings.training.seed.wrapping_add(2);
+        settings.velocity.init(seed, device)
+    }
+
+    fn hidden_weights(&self) -> Vec<ParamId> {
+        self.hidden_weights()
+    }
+}
+
+/// The end fields, the velocity field and how they are trained.
+pub(super) struct EndsAndFlow<B: TrainBackend, V: FlowVelocity<B>> {
     settings: Settings,
     schedule: Schedule,
     device: B::Device,
     /// What holds both shapes and the space around them.
     bounds: Bounds,
     ends: Trainee<B, EndFields<B>>,
-    velocity: Trainee<B, VelocityNet<B>>,
+    velocity: Trainee<B, V>,
 }
 
-impl<B: TrainBackend> EndsAndFlow<B> {
+/// With a network as `V`.
+pub(super) type EndsAndNet<B> = EndsAndFlow<B, VelocityNet<B>>;
+
+impl<B: TrainBackend, V: FlowVelocity<B>> EndsAndFlow<B, V> {
     /// All networks as the recipe's seed makes them; `bounds` encloses both shapes, normalised.
     pub(super) fn new(recipe: &Recipe, bounds: &Bounds, device: &B::Device) -> Self {
         let settings = Settings::new(recipe);
         let seed = settings.training.seed;
         let implicit = settings.implicit;
         let ends = EndFieldsConfig { implicit }.init(seed, device);
-        // The end fields take `seed` and the one after it.
-        let velocity = settings.velocity.init(seed.wrapping_add(2), device);
+        let velocity = V::new(&settings, bounds, device);
         let training = &settings.training;
         let (hidden, hidden_velocity) = (ends.hidden_weights(), velocity.hidden_weights());
         Self {
@@ -129,6 +190,12 @@ pub(super) fn draw(settings: &Settings, phase: Phase, data: &TrainingData, step:
         ..BatchSizes::new(training, data)
     };
     let ends = EndBatch::draw(data, training, step, settings.measures_distances());
+    if phase == Phase::ImplicitOnly {
+        return Drawn {
+            ends,
+            ..Drawn::default()
+        };
+    }
     if phase == Phase::Guided {
         return Drawn {
             guided: Guided::draw(data, training, sizes, step),
@@ -147,6 +214,7 @@ pub(super) fn draw(settings: &Settings, phase: Phase, data: &TrainingData, step:
 pub(super) struct Made<'a, B: TrainBackend> {
     pub settings: &'a Settings,
     pub schedule: &'a Schedule,
+    pub phase: Phase,
     pub device: &'a B::Device,
     pub ends: &'a EndFields<B>,
     pub v: &'a dyn VelocityField<B>,
@@ -174,7 +242,7 @@ impl<B: TrainBackend> Made<'_, B> {
                 matching_scale: schedule.matching_scale(last_scale, step),
                 device,
             },
-            phase: phase(schedule, step),
+            phase: self.phase,
             warms_up: schedule.phase(step) == Phase::WarmUp,
             ramp: schedule.ramp(step),
             ends: self.ends,
@@ -183,7 +251,7 @@ impl<B: TrainBackend> Made<'_, B> {
     }
 }
 
-impl<B: TrainBackend> EndsAndFlow<B> {
+impl<B: TrainBackend, V: FlowVelocity<B>> EndsAndFlow<B, V> {
     /// The end fields as the flow carries them.
     fn carried(&self) -> FlowGeometry<B::InnerBackend> {
         let probes = rows(&lattice(&self.bounds), &self.device);
@@ -191,9 +259,12 @@ impl<B: TrainBackend> EndsAndFlow<B> {
     }
 }
 
-impl<B: TrainBackend> Method<B> for EndsAndFlow<B> {
+impl<B: TrainBackend, V: FlowVelocity<B>> Method<B> for EndsAndFlow<B, V> {
     fn phase(&self, step: usize) -> Phase {
-        phase(&self.schedule, step)
+        match phase(&self.schedule, step) {
+            Phase::Guided if V::IS_GUIDE => Phase::ImplicitOnly,
+            phase => phase,
+        }
     }
 
     fn rates(&self, step: usize) -> Rates {
@@ -214,6 +285,7 @@ impl<B: TrainBackend> Method<B> for EndsAndFlow<B> {
         let made = Made {
             settings: &self.settings,
             schedule: &self.schedule,
+            phase: self.phase(step),
             device: &self.device,
             ends: &ends,
             v: &v,
@@ -245,12 +317,22 @@ impl<B: TrainBackend> Method<B> for EndsAndFlow<B> {
 
     fn restore(&mut self, records: &Records) -> Result<(), RecordError> {
         self.ends.restore(records)?;
-        self.velocity.restore(records)
+        let velocity = &mut self.velocity;
+        let name = velocity.file();
+        velocity.net = velocity.net.like_record(records, &name, &self.device)?;
+        velocity.restore(records)
+    }
+
+    fn take(&mut self, guide: &dyn Guide) {
+        if let Some(net) = V::of_guide(guide, &self.device) {
+            self.velocity.net = net;
+        }
     }
 
     fn weights(&self) -> Option<Weights> {
         let mut weights = Weights {
             flow_steps: Some(self.carried().steps()),
+            grid: self.velocity.net.grid(),
             ..Weights::default()
         };
         // Both end fields: `source.` and `target.`.

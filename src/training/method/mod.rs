@@ -7,6 +7,7 @@
 //! | `network.rs` | `velocity-field` with `implicit.geometry = "network"`: the paper's |
 //! | `ends.rs` | `mlp`, `sdf-blend`, `lipmlp`: fitted at t = 0 and t = 1 only |
 //! | `spline.rs` | `velocity-field` with `velocity.kind = "spline"`: solved for, not trained |
+//! | `trained_spline.rs` | with `"trained-spline"`: solved for first, beside end fields that are networks |
 //! | `nise.rs` | `nise`, `nise-velocity` |
 //! | `eigenbasis.rs` | `eigenbasis` |
 //! | `nfgp.rs` | `nfgp` |
@@ -27,6 +28,7 @@ mod nise;
 mod sequence;
 pub(crate) mod spec;
 pub mod spline;
+mod trained_spline;
 
 use std::io;
 
@@ -34,7 +36,7 @@ use burn::module::{AutodiffModule, ParamId};
 use burn::optim::GradientsParams;
 use isomorph_model::{Geometry, ModelBackend, Motion, TrainBackend};
 
-use crate::data::{Bounds, TrainingData};
+use crate::data::{Bounds, Guide, TrainingData};
 use crate::optimiser::Optimiser;
 use crate::posed::{Posed, Slopes};
 use crate::recipe::{self, Change, GeometryKind, Recipe, TrainingRecipe, VelocityKind};
@@ -90,7 +92,8 @@ macro_rules! methods {
 
 methods! {
     own {
-        flow::FLOW => EndsAndFlow,
+        flow::FLOW => EndsAndNet,
+        trained_spline::TRAINED_SPLINE => EndsAndSpline,
         network::NETWORK => VelocityField,
     }
     solved {
@@ -126,12 +129,17 @@ pub fn spec_of(recipe: &Recipe) -> &'static MethodSpec {
 /// Whether step `step` of the recipe takes a velocity field that is there already
 /// ([`TrainingData::guide`]): key `training.guided-until`, in the methods where it acts.
 pub fn is_guided(recipe: &Recipe, step: usize) -> bool {
-    flow::is_guided(recipe, step)
+    flow::is_guided(recipe, step) || starts_solved(recipe) && step == 0
+}
+
+/// Whether the first step cannot be without such a field: `V` is that field, and goes on from it.
+pub fn starts_solved(recipe: &Recipe) -> bool {
+    *spec_of(recipe) == trained_spline::TRAINED_SPLINE
 }
 
 /// Whether networks of the recipe are fitted to the shapes at their times, and a motion carries them.
 pub fn has_end_fields(recipe: &Recipe) -> bool {
-    *spec_of(recipe) == flow::FLOW
+    *spec_of(recipe) == flow::FLOW || starts_solved(recipe)
 }
 
 /// The method of a name, where several have it that of the kind of V and of the geometry.
@@ -186,6 +194,9 @@ pub trait Method<B: TrainBackend>: Sync {
     /// # Errors
     /// [`RecordError`] if a record is missing or of another kind.
     fn restore(&mut self, records: &Records) -> Result<(), RecordError>;
+
+    /// Starts with a velocity field that is there already, if it can be that field: before the first step.
+    fn take(&mut self, _: &dyn Guide) {}
 
     /// Takes the networks of a run through the first `known` key frames, which are learned already. A method whose
     /// networks are others there learns all anew.

@@ -153,6 +153,7 @@ impl<B: TrainBackend> Method<B> for EndsThroughKeys<B> {
         let made = Made {
             settings: &self.of_intervals[s],
             schedule: &self.schedule,
+            phase: self.phase(step),
             device: &self.device,
             ends: &ends,
             v: &v,

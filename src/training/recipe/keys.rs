@@ -132,6 +132,8 @@ section! {
     velocity: VelocityRecipe {
         /// What V is made of. "network": a network, which is trained. "spline": quadratic B-splines on
         /// a grid, found by Gauss-Newton in seconds; the end fields are then the shapes themselves.
+        /// "trained-spline": the same splines beside end fields that are networks; after
+        /// training.guided-until V is trained with them.
         kind: VelocityKind = "spline" | "network" | "network" | "network" | "network",
             Rule::word(VelocityKind::WORDS);
         /// Hidden layers.
@@ -263,7 +265,8 @@ section! {
             Rule::number(0.0, 1.0).unit("share of the first one").zero("lets it fall to nothing");
         /// Until then V learns the field of splines that the preset "instant" finds, instead of the terms
         /// of the motion, and the end fields train beside it. Fewer steps are needed then. Where no splines are
-        /// found, V learns from its own terms throughout. Not in the paper.
+        /// found, V learns from its own terms throughout. A V of splines is that field itself until then. Not in the
+        /// paper.
         guided_until: f64 = 0 | 1 | 0.6 | 0.6 | 0,
             Rule::number(0.0, 1.0).unit("share of the steps").zero("starts without splines");
         /// End of the warm-up. Until then the weight of on-surface is 0 and matching-warm-up

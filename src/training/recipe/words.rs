@@ -126,6 +126,8 @@ words! {
         Network = "network",
         /// Splines, which are solved for.
         Spline = "spline",
+        /// Splines, which are solved for and then trained like a network.
+        TrainedSpline = "trained-spline",
     }
 
     /// The form of the level-set equation.

@@ -1,6 +1,7 @@
 //! A velocity field that learns from another one first.
 
 use burn::tensor::Tensor;
+use isomorph_spline::{SplineField, TimeBasis};
 
 use super::*;
 use crate::data::Guide;
@@ -108,4 +109,121 @@ fn parts_of_guided_samples_are_the_whole() {
         assert_eq!(part.at.points[k / parts], *place);
         assert_eq!(part.velocities[k / parts], whole.velocities[k]);
     }
+}
+
+/// A field of splines that is there already.
+struct Splines(SplineField);
+
+impl Guide for Splines {
+    fn velocities(&self, places: &[[f32; 3]], times: &[f32]) -> Vec<[f32; 3]> {
+        let jets = self.0.jets(places, times).into_iter();
+        jets.map(|jet| jet.value).collect()
+    }
+
+    fn carried(&self, places: &[[f32; 3]], from: &[f32], to: &[f32]) -> Vec<[f32; 3]> {
+        self.0.carry_each(places, from, to, 8)
+    }
+
+    fn splines(&self) -> Option<&SplineField> {
+        Some(&self.0)
+    }
+}
+
+/// Splines around the spheres with other numbers at each node.
+fn splines() -> SplineField {
+    let at_rest = SplineField::at_rest([[-1.0; 3], [2.0; 3]], 0.5, 1, TimeBasis::Linear);
+    let at_rest = at_rest.expect("a small grid");
+    let number = |k: usize| (k as f32 * 0.7).sin() * 0.1;
+    let numbers: Vec<f32> = (0..at_rest.coefficients().len()).map(number).collect();
+    SplineField::from_parts(*at_rest.grid(), TimeBasis::Linear, &numbers).expect("its own grid")
+}
+
+const TRAINED: [&str; 4] = [
+    "velocity.kind=trained-spline",
+    "training.guided-until=0.4",
+    "training.warm-up=0",
+    "training.ramp-until=0",
+];
+
+/// The method with these splines, and its data.
+fn of_splines() -> (Box<dyn Method<B>>, TrainingData) {
+    let mut method = build(&recipe(&TRAINED), &data());
+    method.take(&Splines(splines()));
+    (method, data())
+}
+
+/// The record of V.
+fn velocity(method: &dyn Method<B>) -> Vec<u8> {
+    let records = method.records().expect("encodes");
+    records.bytes("velocity.mpk").expect("V has one").to_vec()
+}
+
+#[test]
+fn a_velocity_of_splines_is_its_guide_until_its_own_terms_train_it() {
+    let (mut method, data) = of_splines();
+    let places = [[0.4, 0.0, 0.1], [0.0, -0.3, 0.2]];
+    let rows = |x: &[[f32; 3]]| crate::tensors::rows::<NdArray, 3>(x, &Default::default());
+    let v = |method: &dyn Method<B>| {
+        let motion = method.motion().expect("a flow has one");
+        let v = motion.velocity(rows(&places), 0.3).expect("it has one");
+        v.into_data().to_vec::<f32>().expect("numbers")
+    };
+    let wanted = splines().values(&places, 0.3);
+    let off = |(a, b): (&f32, &f32)| (a - b).abs();
+    let found = v(&*method);
+    let worst = found.iter().zip(wanted.as_flattened()).map(off);
+    assert!(worst.fold(0.0, f32::max) < 1e-6, "{found:?}, {wanted:?}");
+    let before = velocity(&*method);
+    for step in 0..6 {
+        assert_eq!(velocity(&*method) == before, step <= 4, "step {step}");
+        let terms = advance(&mut *method, &data, step);
+        let has = |name: &str| terms.iter().any(|term| term.name == name);
+        // What is given is not learned.
+        assert_eq!([has("guide"), has("matching")], [false, step >= 4]);
+        assert!(has("data"), "the end fields train");
+    }
+}
+
+#[test]
+fn records_of_splines_bring_their_grid_and_are_read_with_care() {
+    let (mut method, data) = of_splines();
+    (0..6).for_each(|step| drop(advance(&mut *method, &data, step)));
+    let records = method.records().expect("encodes");
+    // Before it has a grid.
+    let mut again = build(&recipe(&TRAINED), &data);
+    again.restore(&records).expect("records of the same method");
+    assert!(networks(&*method) == networks(&*again));
+    advance(&mut *method, &data, 6);
+    advance(&mut *again, &data, 6);
+    assert!(networks(&*method) == networks(&*again), "bit for bit");
+    for (cells, problem) in [
+        ([7, 8, 8], "has another shape"),
+        ([u32::MAX; 3], "more than there are coefficients"),
+        ([0, 8, 8], "grid"),
+    ] {
+        let mut changed = records.clone();
+        let file = changed
+            .0
+            .iter_mut()
+            .find(|(name, _)| name == "velocity.mpk");
+        let (_, bytes) = file.expect("V has one");
+        let mut value = rmpv::decode::read_value(&mut bytes.as_slice()).expect("MessagePack");
+        *entry(entry(entry(&mut value, "item"), "grid"), "cells") =
+            rmpv::Value::Array(cells.map(rmpv::Value::from).to_vec());
+        bytes.clear();
+        rmpv::encode::write_value(bytes, &value).expect("encoded");
+        let refused = build(&recipe(&TRAINED), &data).restore(&changed);
+        let said = refused.expect_err("another grid").to_string();
+        assert!(said.starts_with("velocity.mpk: "), "{said}");
+        assert!(said.contains(problem), "{said}");
+    }
+}
+
+fn entry<'a>(value: &'a mut rmpv::Value, name: &str) -> &'a mut rmpv::Value {
+    let rmpv::Value::Map(entries) = value else {
+        panic!("entries by name");
+    };
+    let mut found = entries.iter_mut();
+    let found = found.find(|(key, _)| key.as_str() == Some(name));
+    &mut found.expect("there is such an entry").1
 }

@@ -23,8 +23,8 @@ fn a_key_of_the_other_geometry_is_an_error_with_its_line_and_its_home() {
     assert_eq!(
         refused(SHAPES, &["preset=paper", "loss.distance=1"]),
         "set loss.distance=1: does nothing in the method velocity-field with implicit.geometry = \
-         \"network\"; leave it out (it acts in implicit.geometry = \"flow\", method.name = \"mlp\", \
-         method.name = \"sdf-blend\" or method.name = \"efis\")"
+         \"network\"; leave it out (it acts in implicit.geometry = \"flow\", velocity.kind = \
+         \"trained-spline\", method.name = \"mlp\", method.name = \"sdf-blend\" or method.name = \"efis\")"
     );
 }
 
