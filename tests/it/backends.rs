@@ -14,7 +14,7 @@
 //! fails: it does not pass over what it cannot see.
 
 use crate::support::run::Logged;
-use crate::support::workplace::{NETWORK, SHIPPED, Workplace, turn};
+use crate::support::workplace::{NETWORK, SHIPPED, TINY, Workplace, turn};
 
 /// Two steps of warm-up, one of ramp, two of both networks, one of f alone.
 const PHASES: &[&str] = &[
@@ -100,10 +100,11 @@ fn cases() -> [(&'static str, Vec<&'static str>); 6] {
 
 /// The logged steps of a run with these keys.
 fn logged(keys: &[&str], backend: &str, derivatives: &str) -> Vec<Logged> {
-    // Splines have no units.
-    let units = |key: &&&str| !(keys.contains(&TRAINED_SPLINE[0]) && key.starts_with("velocity"));
-    let phases: Vec<&str> = PHASES.iter().filter(units).copied().collect();
-    let place = Workplace::tiny(&[keys, &phases].concat());
+    // Splines have no layers.
+    let is_spline = keys.contains(&TRAINED_SPLINE[0]);
+    let acts = |key: &&&str| !(is_spline && key.starts_with("velocity."));
+    let of = |keys: &[&'static str]| -> Vec<&str> { keys.iter().filter(acts).copied().collect() };
+    let place = Workplace::tiny_with(&of(TINY), &[keys, &of(PHASES)].concat());
     let set = format!("training.derivatives={derivatives}");
     let run = place.train("run", &["--backend", backend, "--set", &set]);
     let made_by = run.state()["backend"].as_str().expect("a name").to_owned();

@@ -137,7 +137,7 @@ pub(crate) const NETWORK: &[&str] = &[
 pub(crate) const COLUMNS: [(&str, &[&str]); 2] = [("shipped", SHIPPED), ("network", NETWORK)];
 
 /// Sizes with which a step takes milliseconds; all of them act in both columns.
-const TINY: &[&str] = &[
+pub(crate) const TINY: &[&str] = &[
     "implicit.depth = 3",
     "implicit.width = 32",
     "velocity.depth = 2",
