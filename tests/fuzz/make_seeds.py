@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 """Writes the seeds of the fuzz targets: small valid files of each kind.
 
-    python3 tests/fuzz/make_seeds.py NETWORK SOLVED TRAINED
+    python3 tests/fuzz/make_seeds.py NETWORK SOLVED
 
-NETWORK, SOLVED and TRAINED are the folders of small runs between two shapes, source.ply and target.ply beside them, by
-recipe.toml in tests/fuzz/runs/network, solved and trained. The recipe, metrics and state of the first and the
-checkpoints of all become seeds. The target `checkpoint` has their files in it, from tests/fuzz/runs. Needs numpy.
+NETWORK and SOLVED are the folders of two small runs between two shapes, source.ply and target.ply beside them, by
+tests/fuzz/runs/network/recipe.toml and tests/fuzz/runs/solved/recipe.toml. The recipe, metrics and state of the first and the checkpoints of both become seeds. The
+target `checkpoint` has their files in it, from tests/fuzz/runs. Needs numpy.
 """
 
 import io
@@ -198,9 +198,9 @@ def checkpoints(folders):
 def main():
     ply(), obj(), off(), stl(), xyz(), npy(), glb(), anime(), pairs()
     recipe(Path(__file__).parents[2])
-    network, solved, trained = map(Path, sys.argv[1:4])
+    network, solved = map(Path, sys.argv[1:3])
     run(network)
-    checkpoints({"network": network, "solved": solved, "trained": trained})
+    checkpoints({"network": network, "solved": solved})
 
 
 if __name__ == "__main__":

@@ -25,12 +25,10 @@ macro_rules! stored {
     };
 }
 
-const RUNS: [Stored; 3] = [
+const RUNS: [Stored; 2] = [
     stored!("network": "ends-muon-optimiser" "ends-optimiser" "ends" "velocity-muon-optimiser"
         "velocity-optimiser" "velocity"),
     stored!("solved": "ends" "velocity"),
-    stored!("trained": "ends-muon-optimiser" "ends-optimiser" "ends" "velocity-muon-optimiser"
-        "velocity-optimiser" "velocity"),
 ];
 
 // The first byte chooses the record that the others are. Its checksum is right: this is no damage by chance.
