@@ -164,14 +164,11 @@ fn fields(text: &mut String, recipe: &Recipe) -> std::fmt::Result {
             "f            {} x {}, {}",
             f.depth, f.width, f.activation
         )?;
-        match method::starts_solved(recipe) {
-            true => writeln!(text, "V            {}", splines(recipe))?,
-            false => writeln!(
-                text,
-                "V            {} x {}, {}",
-                v.depth, v.width, v.activation
-            )?,
-        }
+        let motion = match method::starts_solved(recipe) {
+            true => splines(recipe),
+            false => format!("{} x {}, {}", v.depth, v.width, v.activation),
+        };
+        writeln!(text, "V            {motion}")?;
     }
     Ok(())
 }

@@ -167,20 +167,19 @@ fn described(recipe: &Recipe, checkpoint: &Checkpoint, weights: &Weights) -> Val
     };
     let mut networks = json!({ "velocity": velocity });
     let of = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
-    let has_end_fields = method::has_end_fields(recipe);
-    let names: Vec<String> = match (has_end_fields, recipe.data.keyframes.len()) {
-        (false, _) => of(&["implicit"]),
-        (true, 2) => of(&["source", "target"]),
-        (true, keys) => (0..keys).map(|k| format!("end.{k:04}")).collect(),
+    let geometry = match method::has_end_fields(recipe) {
+        true => GeometryKind::Flow,
+        false => GeometryKind::Network,
+    };
+    let names: Vec<String> = match (geometry, recipe.data.keyframes.len()) {
+        (GeometryKind::Network, _) => of(&["implicit"]),
+        (GeometryKind::Flow, 2) => of(&["source", "target"]),
+        (GeometryKind::Flow, keys) => (0..keys).map(|k| format!("end.{k:04}")).collect(),
     };
     for name in names {
         networks[name] = field.clone();
     }
     let mut about = frame(recipe, checkpoint);
-    let geometry = match has_end_fields {
-        true => GeometryKind::Flow,
-        false => GeometryKind::Network,
-    };
     about["geometry"] = json!(geometry.to_string());
     about["flow_steps"] = json!(weights.flow_steps);
     if !weights.intervals.is_empty() {

@@ -78,6 +78,17 @@ pub(crate) fn field<'a>(value: &'a Value, name: &str) -> Option<&'a Value> {
     found.map(|(_, value)| value)
 }
 
+/// The entry of a map, to be changed.
+#[cfg(test)]
+pub(crate) fn field_mut<'a>(value: &'a mut Value, name: &str) -> &'a mut Value {
+    let Value::Map(entries) = value else {
+        panic!("entries by name");
+    };
+    let mut found = entries.iter_mut();
+    let found = found.find(|(key, _)| key.as_str() == Some(name));
+    &mut found.expect("there is such an entry").1
+}
+
 /// burn writes an array as its bytes beside its shape and the type of its numbers.
 fn is_array(value: &Value) -> bool {
     ["bytes", "shape", "dtype"]

@@ -375,7 +375,7 @@ mod tests {
         for name in ["Rank3", "Rank0", "Rank9"] {
             let found = problem("adam.mpk", &["item"], |value| {
                 first(value, &|(_, state)| {
-                    renamed(field_mut(state, "V1"), "Rank2", name);
+                    renamed(alike::field_mut(state, "V1"), "Rank2", name);
                 });
             });
             assert!(
@@ -388,15 +388,6 @@ mod tests {
             first(value, &|(_, state)| as_lists(state));
         });
         assert!(found.ends_with("holds a list that is no array"), "{found}");
-    }
-
-    fn field_mut<'a>(value: &'a mut Value, name: &str) -> &'a mut Value {
-        let Value::Map(entries) = value else {
-            panic!("entries by name");
-        };
-        let mut found = entries.iter_mut();
-        let found = found.find(|(key, _)| key.as_str() == Some(name));
-        &mut found.expect("there is such an entry").1
     }
 
     fn renamed(value: &mut Value, name: &str, other: &str) {

@@ -6,9 +6,7 @@ use std::io;
 use burn::module::{AutodiffModule, Module, ParamId};
 use isomorph_model::flow::end_fields::{EndFields, EndFieldsConfig};
 use isomorph_model::operators::VelocityField;
-use isomorph_model::{
-    FlowGeometry, Geometry, ModelBackend, Objective, SplineGrid, TrainBackend, VelocityNet,
-};
+use isomorph_model::{FlowGeometry, Geometry, Objective, SplineGrid, TrainBackend, VelocityNet};
 
 use super::ends::OnDevice;
 use super::spec::{Acts, Keys, MethodSpec, Needs};
@@ -69,7 +67,14 @@ const PROBES: usize = 24;
 
 /// What may be the `V` of a flow between two shapes.
 pub(super) trait FlowVelocity<B: TrainBackend>:
-    AutodiffModule<B, InnerModule: VelocityOfFlow<B::InnerBackend>> + VelocityField<B> + Sync + 'static
+    AutodiffModule<
+        B,
+        InnerModule: VelocityField<B::InnerBackend>
+                         + isomorph_model::Motion<B::InnerBackend>
+                         + 'static,
+    > + VelocityField<B>
+    + Sync
+    + 'static
 {
     /// Whether it is the guide in the steps that are guided, and does not learn from it.
     const IS_GUIDE: bool;
@@ -97,17 +102,6 @@ pub(super) trait FlowVelocity<B: TrainBackend>:
     fn grid(&self) -> Option<SplineGrid> {
         None
     }
-}
-
-/// What carries points and fields.
-pub(super) trait VelocityOfFlow<B: ModelBackend>:
-    VelocityField<B> + isomorph_model::Motion<B> + Clone + 'static
-{
-}
-
-impl<B: ModelBackend, V: VelocityField<B> + isomorph_model::Motion<B> + Clone + 'static>
-    VelocityOfFlow<B> for V
-{
 }
 
 impl<B: TrainBackend> FlowVelocity<B> for VelocityNet<B> {

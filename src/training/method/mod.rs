@@ -281,7 +281,10 @@ pub fn fixed_change(before: &Recipe, after: &Recipe) -> Option<(Change, &'static
         let section = change.key.split('.').next().unwrap_or_default();
         let why = match section {
             "implicit" | "velocity" => "a trained network cannot change its shape",
-            _ => fixed.iter().find(|(key, _)| *key == change.key)?.1,
+            _ => {
+                let is_fixed = |key: &str| key == change.key || key == section;
+                fixed.iter().find(|(key, _)| is_fixed(key))?.1
+            }
         };
         Some((change, why))
     })

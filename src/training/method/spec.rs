@@ -24,7 +24,7 @@ pub struct MethodSpec {
     pub(crate) acts: Acts,
     /// The section of the keys that it has alone.
     pub(crate) own: Option<&'static Section>,
-    /// Keys beside those of the networks that are fixed once a run has begun, each with the reason.
+    /// Keys beside those of the networks that are fixed once a run has begun, or all of a section, each with the reason.
     pub(crate) fixed: &'static [(&'static str, &'static str)],
     /// What a comparison changes for it in the preset `quick`, beside the method itself.
     pub(crate) changes: &'static [&'static str],

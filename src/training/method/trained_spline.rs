@@ -4,7 +4,7 @@
 
 use burn::module::ParamId;
 use isomorph_model::{SplineGrid, SplineVelocity, TrainBackend};
-use isomorph_spline::{SplineError, TimeBasis};
+use isomorph_spline::TimeBasis;
 
 use super::FIXED_OPTIMISER;
 use super::flow::{EndsAndFlow, FLOW, FlowVelocity};
@@ -15,9 +15,6 @@ use crate::recipe::VelocityKind;
 use crate::recipe::schema::Keyed;
 use crate::records::{RecordError, Records};
 use crate::settings::Settings;
-
-/// Why no key of the solver changes in a run.
-const SOLVED: &str = "V is solved for before the first step";
 
 /// Splines as `V`, and networks as `f`.
 pub(super) static TRAINED_SPLINE: MethodSpec = MethodSpec {
@@ -43,15 +40,7 @@ pub(super) static TRAINED_SPLINE: MethodSpec = MethodSpec {
     own: Some(SplineKeys::SECTION),
     fixed: &[
         FIXED_OPTIMISER[0],
-        ("spline.spacing", SOLVED),
-        ("spline.coarse-shares", SOLVED),
-        ("spline.motion", SOLVED),
-        ("spline.sheet-thickness", SOLVED),
-        ("spline.band", SOLVED),
-        ("spline.surface-samples", SOLVED),
-        ("spline.robust", SOLVED),
-        ("spline.iterations", SOLVED),
-        ("spline.tolerance", SOLVED),
+        ("spline", "V is solved for before the first step"),
     ],
     changes: &[],
     takes_many: false,
@@ -111,7 +100,7 @@ impl<B: TrainBackend> FlowVelocity<B> for SplineVelocity<B> {
             return Err(RecordError::new(name, problem));
         }
         Self::at_rest(grid, basis, device)
-            .map_err(|error: SplineError| RecordError::new(name, format!("grid: {error}")))
+            .map_err(|error| RecordError::new(name, format!("grid: {error}")))
     }
 
     fn grid(&self) -> Option<SplineGrid> {

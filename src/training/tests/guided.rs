@@ -4,6 +4,7 @@ use burn::tensor::Tensor;
 use isomorph_spline::{SplineField, TimeBasis};
 
 use super::*;
+use crate::alike::field_mut;
 use crate::data::Guide;
 use crate::report::Phase;
 
@@ -208,8 +209,8 @@ fn records_of_splines_bring_their_grid_and_are_read_with_care() {
             .find(|(name, _)| name == "velocity.mpk");
         let (_, bytes) = file.expect("V has one");
         let mut value = rmpv::decode::read_value(&mut bytes.as_slice()).expect("MessagePack");
-        *entry(entry(entry(&mut value, "item"), "grid"), "cells") =
-            rmpv::Value::Array(cells.map(rmpv::Value::from).to_vec());
+        let grid = field_mut(field_mut(&mut value, "item"), "grid");
+        *field_mut(grid, "cells") = rmpv::Value::Array(cells.map(rmpv::Value::from).to_vec());
         bytes.clear();
         rmpv::encode::write_value(bytes, &value).expect("encoded");
         let refused = build(&recipe(&TRAINED), &data).restore(&changed);
@@ -217,13 +218,4 @@ fn records_of_splines_bring_their_grid_and_are_read_with_care() {
         assert!(said.starts_with("velocity.mpk: "), "{said}");
         assert!(said.contains(problem), "{said}");
     }
-}
-
-fn entry<'a>(value: &'a mut rmpv::Value, name: &str) -> &'a mut rmpv::Value {
-    let rmpv::Value::Map(entries) = value else {
-        panic!("entries by name");
-    };
-    let mut found = entries.iter_mut();
-    let found = found.find(|(key, _)| key.as_str() == Some(name));
-    &mut found.expect("there is such an entry").1
 }

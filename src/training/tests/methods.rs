@@ -190,4 +190,9 @@ fn a_run_that_has_begun_keeps_its_method_its_networks_and_what_is_shared_out() {
     assert_eq!(steps.as_deref(), Some("training.steps"));
     let omega = key(&[nise], &[nise, "nise.omega=9"]);
     assert_eq!(omega.as_deref(), Some("nise.omega"));
+    // What a field is solved with, all of it.
+    let trained = "velocity.kind=trained-spline";
+    assert_eq!(key(&[trained], &[trained, "training.steps=20"]), None);
+    let band = key(&[trained], &[trained, "spline.band=2000"]);
+    assert_eq!(band.as_deref(), Some("spline.band"));
 }
